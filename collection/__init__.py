@@ -1,0 +1,1 @@
+"""Running trials: objects, sampling, plan, cameras, robots, session, command line."""

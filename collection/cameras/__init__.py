@@ -1,0 +1,1 @@
+"""Depth cameras, real and simulated, behind one interface."""

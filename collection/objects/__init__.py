@@ -1,0 +1,1 @@
+"""The printable objects of our own."""

@@ -1,0 +1,1 @@
+"""Arms and grippers, real and simulated, behind one interface."""

@@ -1,0 +1,1 @@
+"""The records: journal, MCAP, Rerun view, recovery, export, report."""

@@ -1,0 +1,1 @@
+"""The labeled data set in the formats people load."""

@@ -1,0 +1,1 @@
+"""The one source of the record types, and what is generated from it."""

@@ -1,0 +1,1 @@
+"""The contact models: REACH and its rivals."""

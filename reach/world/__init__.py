@@ -1,0 +1,1 @@
+"""The MuJoCo grasp world: pads as sprung pins."""
