@@ -1,0 +1,73 @@
+"""The command `reach`: which commands there are, and how an error reaches the user."""
+
+from __future__ import annotations
+
+import importlib
+import sys
+from collections.abc import Sequence
+
+import typer
+
+from reach.errors import ReachError
+
+COMMANDS: dict[str, str] = {}
+"""Command name -> module in collection.cli that holds a function of the same name."""
+
+
+def build_app() -> typer.Typer:
+    """Assemble the command line from one module a command."""
+    app = typer.Typer(
+        name="reach",
+        help="Plan, run, label, score and export physical robot grasp trials.",
+        no_args_is_help=True,
+        add_completion=False,
+        rich_markup_mode="markdown",
+        pretty_exceptions_enable=False,
+    )
+    for name, module_name in COMMANDS.items():
+        module = importlib.import_module(f"collection.cli.{module_name}")
+        member = getattr(module, module_name)
+        if isinstance(member, typer.Typer):
+            app.add_typer(member, name=name)
+        else:
+            app.command(name)(member)
+    return app
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run one command.
+
+    Args:
+        arguments: as typed after `reach`; the process's own if None.
+
+    Returns:
+        Exit code: 0 done, 2 bad input (one line on stderr), 130 interrupted.
+    """
+    command = typer.main.get_command(build_app())
+    try:
+        result = command.main(
+            args=None if arguments is None else list(arguments),
+            prog_name="reach",
+            standalone_mode=False,
+        )
+    except ReachError as error:
+        return _complain(str(error), 2)
+    except typer.TyperException as error:
+        return _complain(error.format_message(), 2)
+    except (typer.Abort, KeyboardInterrupt):
+        return _complain("interrupted", 130)
+    except BrokenPipeError:
+        return 0  # the reader of our output (head, less) has seen enough
+    return result if isinstance(result, int) else 0
+
+
+def _complain(message: str, code: int) -> int:
+    line = " ".join(message.split())
+    if line:
+        print(f"error: {line}", file=sys.stderr)
+    return code
+
+
+def run() -> None:
+    """Entry point of the command `reach`."""
+    sys.exit(main())
