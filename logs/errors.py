@@ -1,0 +1,70 @@
+"""What can go wrong with a session's files: each message names the file and the way out."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from pathlib import Path
+
+from reach.errors import InvalidInputError, ReachError
+
+
+class LogError(ReachError):
+    """Base of every error about recorded sessions."""
+
+
+class JournalDamagedError(LogError):
+    """A line in the middle of the journal cannot be trusted; nothing is read past it."""
+
+    def __init__(self, path: Path, line: int, problem: str) -> None:
+        self.path = path
+        self.line = line
+        self.problem = problem
+        super().__init__(
+            f"{path}: line {line} {problem}; `reach recover {path.parent}` sets such lines aside"
+            " and keeps all others"
+        )
+
+
+class JournalWriteError(LogError):
+    """An event could not be put on the disk; it was not acknowledged."""
+
+
+class SessionLockedError(LogError):
+    """Another process is the session's one writer."""
+
+
+class NotASessionError(InvalidInputError, LogError):
+    """The folder is no session, or its session.json cannot be read."""
+
+
+class SessionExistsError(InvalidInputError, LogError):
+    """A session would be created where something is already."""
+
+    def __init__(self, path: Path) -> None:
+        super().__init__(
+            f"{path} exists already; continue it with --resume, or choose another --out"
+        )
+
+
+class SessionChangedError(LogError):
+    """The set-up differs from the one the session was recorded with."""
+
+    def __init__(
+        self, changed: Mapping[str, tuple[str | None, str | None]], acceptable: Iterable[str]
+    ) -> None:
+        self.changed = dict(changed)
+        listed = ", ".join(
+            f"{name} (was {before or 'absent'}, is {after or 'absent'})"
+            for name, (before, after) in sorted(changed.items())
+        )
+        fixed = sorted(set(changed) - set(acceptable))
+        if fixed:
+            way_out = f"a session never changes its {', '.join(fixed)}: start a new one"
+        else:
+            way_out = " ".join(f"--accept-change {name}" for name in sorted(changed))
+            way_out = f"put it back, or open a new logged segment with {way_out}"
+        super().__init__(f"the set-up changed since the session was recorded: {listed}; {way_out}")
+
+
+class DiskFullError(LogError):
+    """Too little room is left on the session's disk for one more trial."""

@@ -1,0 +1,362 @@
+"""What a session's events add up to: which trials are done, labelled, or still to do.
+
+The state is a pure fold of the journal over the planned order: after a kill, the next process
+folds the same events and stands where the last one stood.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, field
+from typing import Literal
+
+from pydantic import BaseModel, ConfigDict
+
+from logs import events as ev
+from logs.events import AnyEvent, Entry, LabelEvent, Outcome, Phase
+
+TakeStatus = Literal["running", "executed", "redone", "voided", "interrupted"]
+TrialStatus = Literal["pending", "running", "unlabelled", "labelled", "skipped"]
+
+
+class PlannedEntry(BaseModel):
+    """One planned trial, as the session needs it; the full plan lies beside in plan.json."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+    number: int
+    trial_id: str
+    grasp_id: str
+    object_name: str
+    repeat: int = 0
+    stable_pose: int | None = None
+
+
+@dataclass(slots=True)
+class TakeState:
+    """One take of a trial.
+
+    Args:
+        take: counts from 1.
+        label: the newest verdict that holds; `labels` are all that hold, oldest first.
+    """
+
+    take: int
+    status: TakeStatus = "running"
+    phase: Phase = Phase.PLACE_OBJECT
+    info: dict[str, object] = field(default_factory=dict)
+    record: str | None = None
+    recovered: bool = False
+    sensor: ev.SensorVerdict | None = None
+    executed_ns: int | None = None
+    accepted_rival: int | None = None
+    labels: list[tuple[Entry, LabelEvent]] = field(default_factory=list)
+    second_labels: dict[str, LabelEvent] = field(default_factory=dict)
+    scores: dict[str, ev.Scored] = field(default_factory=dict)
+    ended_because: str = ""
+
+    @property
+    def label(self) -> LabelEvent | None:
+        """The newest verdict that holds."""
+        return self.labels[-1][1] if self.labels else None
+
+    @property
+    def blind_label(self) -> LabelEvent | None:
+        """The newest verdict that was given without having seen a prediction."""
+        return next((label for _, label in reversed(self.labels) if label.blind), None)
+
+
+@dataclass(slots=True)
+class TrialState:
+    """One planned trial and its takes.
+
+    Args:
+        rev: grows with every event that changes what the operator would decide upon.
+        decisions: label, relabel, redo and skip entries that hold, oldest first.
+    """
+
+    planned: PlannedEntry
+    takes: list[TakeState] = field(default_factory=list)
+    skipped: bool = False
+    rev: int = 0
+    decisions: list[Entry] = field(default_factory=list)
+    notes: list[str] = field(default_factory=list)
+    needs_label: str = ""
+
+    @property
+    def trial_id(self) -> str:
+        """The trial's identity."""
+        return self.planned.trial_id
+
+    @property
+    def valid_take(self) -> TakeState | None:
+        """The newest executed take that counts."""
+        return next((take for take in reversed(self.takes) if take.status == "executed"), None)
+
+    @property
+    def label(self) -> LabelEvent | None:
+        """The verdict that counts."""
+        take = self.valid_take
+        return take.label if take else None
+
+    @property
+    def status(self) -> TrialStatus:
+        """Where the trial stands."""
+        if self.skipped:
+            return "skipped"
+        take = self.valid_take
+        if take is not None:
+            return "labelled" if take.label is not None else "unlabelled"
+        running = bool(self.takes) and self.takes[-1].status == "running"
+        return "running" if running else "pending"
+
+    def find_take(self, number: int) -> TakeState:
+        """The take of that number; a repaired journal may lack the line that began it."""
+        while len(self.takes) < number:
+            self.takes.append(TakeState(len(self.takes) + 1, status="interrupted"))
+        return self.takes[number - 1]
+
+
+@dataclass(frozen=True, slots=True)
+class Counts:
+    """The session in numbers.
+
+    Args:
+        done: trials with an executed take that counts.
+        voided: takes that were void or interrupted; each was or will be taken again.
+        redone: takes the operator wanted again.
+    """
+
+    planned: int
+    done: int
+    labelled: int
+    unlabelled: int
+    voided: int
+    redone: int
+    skipped: int
+    successes: int
+
+
+class SessionState:
+    """The fold. Feed it entries in order; read it at any time.
+
+    Args:
+        planned: the trials in their planned order.
+    """
+
+    def __init__(self, planned: Sequence[PlannedEntry]) -> None:
+        self.trials: dict[str, TrialState] = {
+            entry.trial_id: TrialState(entry) for entry in planned
+        }
+        self.current: str | None = None
+        self.paused = False
+        self.stopped = False
+        self.holds: dict[str, str] = {}
+        self.control_rev = 0
+        self.commands: dict[str, Entry] = {}
+        self.segment = -1
+        self.fingerprints: dict[str, str] = {}
+        self.segments: list[ev.SessionOpened] = []
+        self.closed: ev.SessionClosed | None = None
+        self.simulated_labels = False
+        self.notes: list[str] = []
+        self.seq = 0
+
+    @classmethod
+    def fold(cls, planned: Sequence[PlannedEntry], entries: Iterable[Entry]) -> SessionState:
+        """The state after all these entries."""
+        state = cls(planned)
+        for entry in entries:
+            state.apply(entry)
+        return state
+
+    @property
+    def order(self) -> list[TrialState]:
+        """The trials in their planned order."""
+        return list(self.trials.values())
+
+    @property
+    def current_trial(self) -> TrialState | None:
+        """The trial under way."""
+        return self.trials[self.current] if self.current is not None else None
+
+    def counts(self) -> Counts:
+        """The session in numbers."""
+        statuses = [trial.status for trial in self.trials.values()]
+        takes = [take.status for trial in self.trials.values() for take in trial.takes]
+        labels = [trial.label for trial in self.trials.values() if trial.status == "labelled"]
+        labelled, unlabelled = statuses.count("labelled"), statuses.count("unlabelled")
+        return Counts(
+            planned=len(statuses),
+            done=labelled + unlabelled,
+            labelled=labelled,
+            unlabelled=unlabelled,
+            voided=takes.count("voided") + takes.count("interrupted"),
+            redone=takes.count("redone"),
+            skipped=statuses.count("skipped"),
+            successes=sum(
+                label is not None and label.outcome is Outcome.SUCCESS for label in labels
+            ),
+        )
+
+    def next_work(self) -> TrialState | None:
+        """The trial to attend to next: first those that only lack a label, then the plan's."""
+        for wanted in ("unlabelled", "running", "pending"):
+            for trial in self.trials.values():
+                if trial.status == wanted:
+                    return trial
+        return None
+
+    def last_decision(self) -> tuple[TrialState, Entry] | None:
+        """The newest decision that holds in the whole session: what undo would take back."""
+        made = [(trial, trial.decisions[-1]) for trial in self.trials.values() if trial.decisions]
+        return max(made, key=lambda pair: pair[1].seq, default=None)
+
+    def apply(self, entry: Entry) -> None:
+        """Add one entry."""
+        event = entry.event
+        self.seq = entry.seq
+        command = getattr(event, "command_id", None)
+        if command is not None:
+            self.commands[command] = entry
+        if getattr(event, "source", None) is ev.Source.OPERATOR_SIM:
+            self.simulated_labels = True
+        trial_id = getattr(event, "trial_id", None)
+        if trial_id is None:
+            self._apply_control(event)
+        elif trial_id in self.trials:
+            self._apply_trial(self.trials[trial_id], entry)
+
+    def _apply_control(self, event: AnyEvent) -> None:
+        self.control_rev += 1
+        match event:
+            case ev.SessionOpened():
+                self._open(event)
+            case ev.SessionClosed():
+                self.closed = event
+                self._end_running("the session ended")
+            case ev.Paused():
+                self.paused = True
+            case ev.Resumed():
+                self.paused = False
+            case ev.Held():
+                self.holds[event.cause] = event.text
+            case ev.Released():
+                self.holds.pop(event.cause, None)
+            case ev.Stopped():
+                self.stopped = True
+            case ev.StopCleared():
+                self.stopped = False
+            case ev.Noted():
+                self.notes.append(event.text)
+            case _:
+                pass
+
+    def _open(self, event: ev.SessionOpened) -> None:
+        self._end_running("the session was interrupted")
+        self.segment, self.fingerprints = event.segment, event.fingerprints
+        self.segments.append(event)
+        self.closed = None
+        self.paused = self.stopped = False
+        self.holds.clear()
+
+    def _end_running(self, because: str) -> None:
+        self.current = None
+        for trial in self.trials.values():
+            if trial.takes and trial.takes[-1].status == "running":
+                trial.takes[-1].status = "interrupted"
+                trial.takes[-1].ended_because = because
+                trial.rev += 1
+
+    def _apply_trial(self, trial: TrialState, entry: Entry) -> None:
+        event = entry.event
+        match event:
+            case ev.Scored():
+                trial.find_take(event.take).scores[event.model] = event
+                return
+            case ev.Noted():
+                trial.notes.append(event.text)
+                return
+            case ev.SecondLabelled():
+                trial.find_take(event.take).second_labels[event.operator] = event
+                return
+        trial.rev += 1
+        match event:
+            case ev.TrialStarted() | ev.PhaseEntered() | ev.PoseAccepted() | ev.Executed():
+                self._apply_progress(trial, entry)
+            case ev.Placed() | ev.ObjectReplaced():
+                pass  # the phase that follows tells
+            case ev.NeedsLabel():
+                self._forget_labels(trial, event.why)
+            case ev.Undone():
+                self._undo(trial, event.undoes)
+            case _:
+                self._decide(trial, entry)
+
+    def _apply_progress(self, trial: TrialState, entry: Entry) -> None:
+        match entry.event:
+            case ev.TrialStarted(take=number):
+                trial.find_take(number).status = "running"
+                self.current = trial.trial_id
+            case ev.PhaseEntered(take=number, phase=phase, info=info):
+                take = trial.find_take(number)
+                take.phase = phase
+                take.info.update(info)
+                self.current = trial.trial_id
+            case ev.PoseAccepted(take=number, rival=rival):
+                trial.find_take(number).accepted_rival = rival
+            case ev.Executed() as event:
+                take = trial.find_take(event.take)
+                take.status, take.record, take.sensor = "executed", event.record, event.sensor
+                take.recovered, take.executed_ns = event.recovered, entry.time_ns
+                trial.decisions.clear()  # what was decided about earlier takes is settled
+            case _:
+                pass
+
+    def _decide(self, trial: TrialState, entry: Entry) -> None:
+        match entry.event:
+            case ev.Labelled() | ev.Relabelled() as event:
+                trial.find_take(event.take).labels.append((entry, event))
+                trial.needs_label = ""
+                trial.decisions.append(entry)
+            case ev.Redone() as event:
+                trial.find_take(event.take).status = "redone"
+                trial.find_take(event.take).ended_because = event.cause.value
+                trial.decisions.append(entry)
+            case ev.Skipped():
+                trial.skipped = True
+                self._leave_take(trial, "skipped")
+                trial.decisions.append(entry)
+            case ev.Voided() as event:
+                trial.find_take(event.take).status = "voided"
+                trial.find_take(event.take).ended_because = event.reason
+            case _:
+                pass
+
+    def _leave_take(self, trial: TrialState, because: str) -> None:
+        if trial.takes and trial.takes[-1].status == "running":
+            trial.takes[-1].status = "voided"
+            trial.takes[-1].ended_because = because
+
+    def _undo(self, trial: TrialState, seq: int) -> None:
+        undone = [entry for entry in trial.decisions if entry.seq == seq]
+        trial.decisions = [entry for entry in trial.decisions if entry.seq != seq]
+        for event in (entry.event for entry in undone):
+            match event:
+                case ev.Labelled() | ev.Relabelled():
+                    take = trial.find_take(event.take)
+                    take.labels = [pair for pair in take.labels if pair[0].seq != seq]
+                case ev.Redone():
+                    self._leave_take(trial, "the redo was undone")
+                    trial.find_take(event.take).status = "executed"
+                case ev.Skipped():
+                    trial.skipped = False
+                case _:
+                    pass
+
+    def _forget_labels(self, trial: TrialState, why: str) -> None:
+        trial.needs_label = why
+        trial.decisions.clear()
+        take = trial.valid_take
+        if take is not None:
+            take.labels.clear()
