@@ -1,0 +1,189 @@
+"""The ways a part comes to rest on a flat table, with their probabilities.
+
+A part dropped in a random orientation first touches the table with some facet of its convex
+hull and topples, without inertia, downhill until it rests ([Goldberg1999], as in trimesh).
+Here toppling is a watershed on the hull's height function, and basins that only a negligible
+hump divides are one pose: a part of revolution does not rest on each of its narrow facets.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from reach.arrays import FloatArray, IntArray
+from reach.cache import cache_key, cached_arrays
+from reach.hull import Hull, convex_hull
+from reach.symmetry import Symmetry, symmetry, tolerance
+from reach.transforms import as_transform
+
+if TYPE_CHECKING:
+    from reach.objects import GraspObject
+
+VERSION = 1
+MIN_PROBABILITY = 0.01
+"""Poses below this probability are not planned on."""
+NEGLIGIBLE_HUMP = 1e-4
+"""A part rolls on over an edge that lifts its center of mass by less than this [m]: the
+height of a printed layer."""
+SAME_FACET = np.radians(5.0)
+"""Resting facets whose normals agree to this angle, up to symmetry, are one pose [rad]."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class StablePose:
+    """One way to rest on the table.
+
+    Args:
+        index: position in the list sorted by falling probability.
+        probability: of coming to rest like this, or like a symmetric copy of it.
+        T_world_object: pose with the table at z = 0 and the center of mass above the origin,
+            shape (4, 4); the turn about z is arbitrary.
+    """
+
+    index: int
+    probability: float
+    T_world_object: FloatArray
+
+    def __post_init__(self) -> None:
+        object.__setattr__(
+            self, "T_world_object", as_transform(self.T_world_object, "T_world_object")
+        )
+
+
+def stable_poses(
+    obj: GraspObject, min_probability: float = MIN_PROBABILITY
+) -> tuple[StablePose, ...]:
+    """Stable poses of a part by falling probability, merged under its symmetry, cached.
+
+    Args:
+        obj: the part.
+        min_probability: less probable poses are left out; with 0 the probabilities sum to one.
+    """
+    key = cache_key(
+        "stable poses", VERSION, NEGLIGIBLE_HUMP, obj.content_hash, tuple(np.round(obj.com, 9))
+    )
+
+    def compute() -> dict[str, FloatArray]:
+        normals, probabilities, heights = resting_facets(convex_hull(obj.vertices, obj.com))
+        return _merged(normals, probabilities, heights, symmetry(obj), tolerance(obj))
+
+    entry = cached_arrays("stable_poses", key, compute)
+    return tuple(
+        StablePose(index, float(p), _resting_pose(obj, down))
+        for index, (p, down) in enumerate(
+            zip(entry["probabilities"], entry["normals"], strict=True)
+        )
+        if p >= min_probability
+    )
+
+
+def resting_facets(
+    hull: Hull, hump: float = NEGLIGIBLE_HUMP
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Facets a part comes to rest on.
+
+    Args:
+        hull: of the part, about its center of mass.
+        hump: rise of the center of mass that does not stop a rolling part [m].
+
+    Returns:
+        Outward normals (N, 3), probabilities (N,) that sum to one, heights (N,) of the center
+        of mass [m].
+    """
+    basin = _basins(hull, hump)
+    shares = np.bincount(basin, weights=hull.solid_angles, minlength=len(basin))
+    lowest = np.flatnonzero(shares > 0)
+    shares = shares[lowest] / shares.sum()
+    return hull.normals[lowest], shares, hull.heights[lowest]
+
+
+def _basins(hull: Hull, hump: float) -> IntArray:
+    """Resting facet that each facet's landing ends on, shape (F,).
+
+    Passes between facets are visited from the lowest up; a pass joins two basins if it rises
+    less than the hump over the shallower one (persistence of the height function).
+    """
+    heights = hull.heights
+    facets, across, passes = _passes(hull, heights)
+    parent = np.arange(len(heights))
+
+    def root(facet: int) -> int:
+        while parent[facet] != facet:
+            parent[facet] = parent[parent[facet]]
+            facet = int(parent[facet])
+        return facet
+
+    rank = _tie_breaking_rank(hull, heights)
+    for a, b, height in zip(facets, across, passes, strict=True):
+        low, high = sorted((root(a), root(b)), key=rank.__getitem__)
+        if low != high and height - heights[high] <= hump:
+            parent[high] = low
+    return np.array([root(facet) for facet in range(len(heights))])
+
+
+def _passes(hull: Hull, heights: FloatArray) -> tuple[IntArray, IntArray, FloatArray]:
+    """Neighboring facets and the highest point of the way between them, lowest first.
+
+    The way leads over a saddle if the center's foot lies inside the common edge on both sides;
+    otherwise it falls monotonically, and of several ways down the steepest is the first.
+    """
+    insets = hull.insets
+    rows, slots = np.nonzero(np.arange(len(heights))[:, None] < hull.neighbors)
+    across = hull.neighbors[rows, slots]
+    back = np.argmax(hull.neighbors[across] == rows[:, None], axis=1)
+    here, there = insets[rows, slots], insets[across, back]
+    over_saddle = np.hypot(heights[rows], here)
+    level = np.maximum(heights[rows], heights[across])
+    height = np.where((here > 0) & (there > 0), over_saddle, level)
+    order = np.lexsort((np.minimum(here, there), height))
+    return rows[order], across[order], height[order]
+
+
+def _tie_breaking_rank(hull: Hull, heights: FloatArray) -> IntArray:
+    """Order of facets by height; equal heights by vertex number, whatever the mesh's pose."""
+    coarse = np.round(heights / 1e-8).astype(np.int64)
+    corners = np.sort(hull.corners, axis=1)
+    order = np.lexsort((corners[:, 2], corners[:, 1], corners[:, 0], coarse))
+    rank = np.empty(len(order), dtype=np.int64)
+    rank[order] = np.arange(len(order))
+    return rank
+
+
+def _merged(
+    normals: FloatArray,
+    probabilities: FloatArray,
+    heights: FloatArray,
+    sym: Symmetry,
+    same_height: float,
+) -> dict[str, FloatArray]:
+    """Add up the probabilities of poses that are symmetric copies, and sort them."""
+    chosen: list[int] = []
+    sums: list[float] = []
+    for i in np.argsort(-probabilities, kind="stable"):
+        for slot, j in enumerate(chosen):
+            level = abs(heights[i] - heights[j]) <= same_height
+            if level and sym.equivalent_directions(normals[i], normals[j]) < SAME_FACET:
+                sums[slot] += probabilities[i]
+                break
+        else:
+            chosen.append(int(i))
+            sums.append(float(probabilities[i]))
+    order = np.argsort(-np.array(sums), kind="stable")
+    return {"normals": normals[chosen][order], "probabilities": np.array(sums)[order]}
+
+
+def _resting_pose(obj: GraspObject, down: FloatArray) -> FloatArray:
+    """Pose that turns a direction of the object (3,) down, lowest vertex on the table."""
+    z = -down / np.linalg.norm(down)
+    # World x is the object axis that lies flattest, so that a box comes to lie square.
+    x = np.eye(3)[np.argmin(np.abs(z).round(6))]
+    x = x - (x @ z) * z
+    x /= np.linalg.norm(x)
+    T = np.eye(4)
+    T[:3, :3] = [x, np.cross(z, x), z]
+    T[:3, 3] = -T[:3, :3] @ obj.com
+    T[2, 3] = -(obj.vertices @ z).min()
+    return T
