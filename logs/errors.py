@@ -68,3 +68,31 @@ class SessionChangedError(LogError):
 
 class DiskFullError(LogError):
     """Too little room is left on the session's disk for one more trial."""
+
+
+class RecordError(LogError):
+    """Base of the errors about a trial's record."""
+
+
+class RecordWriteError(RecordError):
+    """The record could not be written: full disk, lost mount, or use after the stop."""
+
+
+class RecordReadError(RecordError):
+    """A file that is no record, or a record without its first message."""
+
+
+class UnknownFormatError(RecordReadError):
+    """A record of a format version that this release does not know."""
+
+
+class UnknownTrialError(InvalidInputError, RecordError):
+    """A trial id that the session does not have."""
+
+
+class ViewError(RecordError):
+    """The Rerun view could not be derived or shown."""
+
+
+class DatasetError(InvalidInputError, LogError):
+    """A labeled data set that cannot be read, joined or written."""
