@@ -205,6 +205,16 @@ class ObjectReplaced(TakeEvent, Decided):
     kind: Literal["object_replaced"] = "object_replaced"
 
 
+class TrueOutcome(BaseModel):
+    """What really happened, which only a simulation knows."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+    outcome: Outcome
+    rotated: bool = False
+    reason: FailureReason | None = None
+
+
 class SensorVerdict(BaseModel):
     """What the gripper's own sensors say about the lift; never the label.
 
@@ -215,7 +225,7 @@ class SensorVerdict(BaseModel):
 
     lifted: bool | None
     jaw_width: float | None = Field(default=None, description="[m], at the end of the hold")
-    truth: dict[str, JsonValue] | None = None
+    truth: TrueOutcome | None = None
 
 
 class Executed(TakeEvent):

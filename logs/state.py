@@ -38,7 +38,9 @@ class TakeState:
 
     Args:
         take: counts from 1.
-        label: the newest verdict that holds; `labels` are all that hold, oldest first.
+        labels: all verdicts that hold, oldest first.
+        revealed_to: operators who were shown a prediction once their label was stored.
+        stopped: the software stop was pressed between placing and the end of the motion.
     """
 
     take: int
@@ -49,9 +51,13 @@ class TakeState:
     recovered: bool = False
     sensor: ev.SensorVerdict | None = None
     executed_ns: int | None = None
+    placed: bool = False
+    replaced: bool = False
     accepted_rival: int | None = None
     labels: list[tuple[Entry, LabelEvent]] = field(default_factory=list)
     second_labels: dict[str, LabelEvent] = field(default_factory=dict)
+    stopped: bool = False
+    revealed_to: set[str] = field(default_factory=set)
     scores: dict[str, ev.Scored] = field(default_factory=dict)
     ended_because: str = ""
 
@@ -72,7 +78,7 @@ class TrialState:
 
     Args:
         rev: grows with every event that changes what the operator would decide upon.
-        decisions: label, relabel, redo and skip entries that hold, oldest first.
+        decisions: label, relabel, redo, void and skip entries that hold, oldest first.
     """
 
     planned: PlannedEntry
@@ -244,7 +250,7 @@ class SessionState:
             case ev.Released():
                 self.holds.pop(event.cause, None)
             case ev.Stopped():
-                self.stopped = True
+                self._stop()
             case ev.StopCleared():
                 self.stopped = False
             case ev.Noted():
@@ -260,6 +266,13 @@ class SessionState:
         self.paused = self.stopped = False
         self.holds.clear()
 
+    def _stop(self) -> None:
+        self.stopped = True
+        trial = self.current_trial
+        if trial is not None and trial.takes and trial.takes[-1].status == "running":
+            take = trial.takes[-1]
+            take.stopped = take.stopped or take.phase is not Phase.PLACE_OBJECT
+
     def _end_running(self, because: str) -> None:
         self.current = None
         for trial in self.trials.values():
@@ -272,7 +285,9 @@ class SessionState:
         event = entry.event
         match event:
             case ev.Scored():
-                trial.find_take(event.take).scores[event.model] = event
+                take = trial.find_take(event.take)
+                take.scores[event.model] = event
+                take.revealed_to |= {label.operator for _, label in take.labels}
                 return
             case ev.Noted():
                 trial.notes.append(event.text)
@@ -280,12 +295,15 @@ class SessionState:
             case ev.SecondLabelled():
                 trial.find_take(event.take).second_labels[event.operator] = event
                 return
+            case ev.PhaseEntered():
+                self._enter_phase(trial, event)
+                return
         trial.rev += 1
         match event:
-            case ev.TrialStarted() | ev.PhaseEntered() | ev.PoseAccepted() | ev.Executed():
-                self._apply_progress(trial, entry)
-            case ev.Placed() | ev.ObjectReplaced():
-                pass  # the phase that follows tells
+            case ev.TrialStarted() | ev.Placed() | ev.PoseAccepted() | ev.ObjectReplaced():
+                self._apply_progress(trial, event)
+            case ev.Executed():
+                self._execute(trial, entry, event)
             case ev.NeedsLabel():
                 self._forget_labels(trial, event.why)
             case ev.Undone():
@@ -293,45 +311,63 @@ class SessionState:
             case _:
                 self._decide(trial, entry)
 
-    def _apply_progress(self, trial: TrialState, entry: Entry) -> None:
-        match entry.event:
+    def _enter_phase(self, trial: TrialState, event: ev.PhaseEntered) -> None:
+        take = trial.find_take(event.take)
+        self.current = trial.trial_id
+        if event.phase not in (take.phase, Phase.RESET):
+            trial.rev += 1  # news about the same phase, or going home, changes no decision
+            take.placed = take.placed and event.phase is not Phase.PLACE_OBJECT
+            if event.phase is Phase.CONFIRM_POSE:
+                take.accepted_rival, take.replaced = None, False
+        take.phase = event.phase
+        take.info.update(event.info)
+
+    def _apply_progress(self, trial: TrialState, event: AnyEvent) -> None:
+        match event:
             case ev.TrialStarted(take=number):
                 trial.find_take(number).status = "running"
                 self.current = trial.trial_id
-            case ev.PhaseEntered(take=number, phase=phase, info=info):
-                take = trial.find_take(number)
-                take.phase = phase
-                take.info.update(info)
-                self.current = trial.trial_id
+            case ev.Placed(take=number):
+                trial.find_take(number).placed = True
             case ev.PoseAccepted(take=number, rival=rival):
                 trial.find_take(number).accepted_rival = rival
-            case ev.Executed() as event:
-                take = trial.find_take(event.take)
-                take.status, take.record, take.sensor = "executed", event.record, event.sensor
-                take.recovered, take.executed_ns = event.recovered, entry.time_ns
-                trial.decisions.clear()  # what was decided about earlier takes is settled
+            case ev.ObjectReplaced(take=number):
+                trial.find_take(number).replaced = True
             case _:
                 pass
+
+    def _execute(self, trial: TrialState, entry: Entry, event: ev.Executed) -> None:
+        take = trial.find_take(event.take)
+        take.status, take.record, take.sensor = "executed", event.record, event.sensor
+        take.recovered, take.executed_ns = event.recovered, entry.time_ns
+        take.phase = Phase.AWAITING_LABEL
+        trial.decisions.clear()  # what was decided about earlier takes is settled
 
     def _decide(self, trial: TrialState, entry: Entry) -> None:
         match entry.event:
             case ev.Labelled() | ev.Relabelled() as event:
-                trial.find_take(event.take).labels.append((entry, event))
+                take = trial.find_take(event.take)
+                take.labels.append((entry, event))
+                if take.scores and event.kind == "label":
+                    take.revealed_to.add(event.operator)
                 trial.needs_label = ""
                 trial.decisions.append(entry)
             case ev.Redone() as event:
-                trial.find_take(event.take).status = "redone"
-                trial.find_take(event.take).ended_because = event.cause.value
-                trial.decisions.append(entry)
+                self._end_take(trial, entry, "redone", event.cause.value)
             case ev.Skipped():
                 trial.skipped = True
                 self._leave_take(trial, "skipped")
                 trial.decisions.append(entry)
             case ev.Voided() as event:
-                trial.find_take(event.take).status = "voided"
-                trial.find_take(event.take).ended_because = event.reason
+                self._end_take(trial, entry, "voided", event.reason)
             case _:
                 pass
+
+    def _end_take(self, trial: TrialState, entry: Entry, status: TakeStatus, because: str) -> None:
+        take = trial.find_take(entry.event.take)  # type: ignore[union-attr]
+        take.status, take.ended_because = status, because
+        if take.record is not None:  # only what was executed can be brought back
+            trial.decisions.append(entry)
 
     def _leave_take(self, trial: TrialState, because: str) -> None:
         if trial.takes and trial.takes[-1].status == "running":
@@ -346,8 +382,8 @@ class SessionState:
                 case ev.Labelled() | ev.Relabelled():
                     take = trial.find_take(event.take)
                     take.labels = [pair for pair in take.labels if pair[0].seq != seq]
-                case ev.Redone():
-                    self._leave_take(trial, "the redo was undone")
+                case ev.Redone() | ev.Voided():
+                    self._leave_take(trial, "the earlier take counts again")
                     trial.find_take(event.take).status = "executed"
                 case ev.Skipped():
                     trial.skipped = False
