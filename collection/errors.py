@@ -116,3 +116,15 @@ class CameraNotConnectedError(CameraError):
     """A capture before connect() or after disconnect()."""
 
     recovery = Recovery.RETRY
+
+
+class PlanError(CollectionError):
+    """Base of what keeps a plan from being made."""
+
+
+class DuplicateNameError(PlanError):
+    """Two parts of one plan share a name."""
+
+
+class NoGraspError(PlanError):
+    """A part that the gripper cannot hold in any way it can lie."""

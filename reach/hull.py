@@ -48,7 +48,8 @@ class Hull:
         inward *= np.sign(np.einsum("fki,fki->fk", self.triangles - first, inward))[..., None]
         length = np.linalg.norm(inward, axis=2)
         offset = np.einsum("fki,fki->fk", inward, -first)
-        return np.divide(offset, length, out=np.zeros_like(offset), where=length > 0)
+        insets: FloatArray = np.divide(offset, length, out=np.zeros_like(offset), where=length > 0)
+        return insets
 
     @property
     def solid_angles(self) -> FloatArray:
@@ -83,7 +84,8 @@ class Hull:
         share = -np.einsum("ij,ij->i", start, edge) / np.einsum("ij,ij->i", edge, edge)
         feet = start + share[:, None] * edge
         points = np.concatenate([minima, feet[(share >= 0) & (share <= 1)], self._peaks()])
-        return points / np.linalg.norm(points, axis=1, keepdims=True)
+        directions: FloatArray = points / np.linalg.norm(points, axis=1, keepdims=True)
+        return directions
 
     def _peaks(self) -> FloatArray:
         """Corners farther from the center than all their neighbors, shape (N, 3) [m]."""

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from reach.arrays import FloatArray, IntArray
+from reach.arrays import BoolArray, FloatArray, IntArray
 
 NO_FACE = -1
 
@@ -48,6 +48,33 @@ class RaycastScene:
         face = answer["primitive_ids"].numpy().astype(np.int64)
         face[~np.isfinite(distance)] = NO_FACE
         return distance, face
+
+    def cast_all(
+        self, origins: FloatArray, directions: FloatArray
+    ) -> tuple[IntArray, FloatArray, IntArray]:
+        """Every crossing of each ray with the surface.
+
+        Args:
+            origins: shape (N, 3) [m].
+            directions: unit vectors, shape (N, 3).
+
+        Returns:
+            Of each crossing the ray's number, the distance [m] and the face, all shape (M,),
+            sorted by ray, then by distance.
+        """
+        rays = np.concatenate([origins - self._middle, directions], axis=1)
+        answer = self._scene.list_intersections(self._tensor(rays))
+        ray = answer["ray_ids"].numpy().astype(np.int64)
+        distance = answer["t_hit"].numpy().astype(float)
+        face = answer["primitive_ids"].numpy().astype(np.int64)
+        order = np.lexsort((face, distance, ray))
+        return ray[order], distance[order], face[order]
+
+    def inside(self, points: FloatArray) -> BoolArray:
+        """Whether points (N, 3) lie in the closed surface, shape (N,)."""
+        occupancy = self._scene.compute_occupancy(self._tensor(points - self._middle), nsamples=3)
+        within: BoolArray = occupancy.numpy() > 0.5
+        return within
 
     def distance(self, points: FloatArray) -> FloatArray:
         """Distance [m] of points (N, 3) from the surface, never negative, shape (N,)."""

@@ -22,7 +22,7 @@ from reach.transforms import as_transform
 if TYPE_CHECKING:
     from reach.objects import GraspObject
 
-VERSION = 1
+VERSION = 2
 MIN_PROBABILITY = 0.01
 """Poses below this probability are not planned on."""
 NEGLIGIBLE_HUMP = 1e-4
@@ -67,8 +67,10 @@ def stable_poses(
     )
 
     def compute() -> dict[str, FloatArray]:
-        normals, probabilities, heights = resting_facets(convex_hull(obj.vertices, obj.com))
-        return _merged(normals, probabilities, heights, symmetry(obj), tolerance(obj))
+        hull = convex_hull(obj.vertices, obj.com)
+        facets, probabilities = resting_facets(hull)
+        facets, probabilities = _merged(hull, facets, probabilities, symmetry(obj), tolerance(obj))
+        return {"normals": hull.normals[facets], "probabilities": probabilities}
 
     entry = cached_arrays("stable_poses", key, compute)
     return tuple(
@@ -80,9 +82,7 @@ def stable_poses(
     )
 
 
-def resting_facets(
-    hull: Hull, hump: float = NEGLIGIBLE_HUMP
-) -> tuple[FloatArray, FloatArray, FloatArray]:
+def resting_facets(hull: Hull, hump: float = NEGLIGIBLE_HUMP) -> tuple[IntArray, FloatArray]:
     """Facets a part comes to rest on.
 
     Args:
@@ -90,14 +90,12 @@ def resting_facets(
         hump: rise of the center of mass that does not stop a rolling part [m].
 
     Returns:
-        Outward normals (N, 3), probabilities (N,) that sum to one, heights (N,) of the center
-        of mass [m].
+        Numbers of the facets (N,), and probabilities (N,) that sum to one.
     """
     basin = _basins(hull, hump)
     shares = np.bincount(basin, weights=hull.solid_angles, minlength=len(basin))
-    lowest = np.flatnonzero(shares > 0)
-    shares = shares[lowest] / shares.sum()
-    return hull.normals[lowest], shares, hull.heights[lowest]
+    facets = np.flatnonzero(shares > 0)
+    return facets, shares[facets] / shares.sum()
 
 
 def _basins(hull: Hull, hump: float) -> IntArray:
@@ -153,26 +151,35 @@ def _tie_breaking_rank(hull: Hull, heights: FloatArray) -> IntArray:
 
 
 def _merged(
-    normals: FloatArray,
+    hull: Hull,
+    facets: IntArray,
     probabilities: FloatArray,
-    heights: FloatArray,
     sym: Symmetry,
     same_height: float,
-) -> dict[str, FloatArray]:
-    """Add up the probabilities of poses that are symmetric copies, and sort them."""
-    chosen: list[int] = []
-    sums: list[float] = []
-    for i in np.argsort(-probabilities, kind="stable"):
-        for slot, j in enumerate(chosen):
-            level = abs(heights[i] - heights[j]) <= same_height
-            if level and sym.equivalent_directions(normals[i], normals[j]) < SAME_FACET:
-                sums[slot] += probabilities[i]
-                break
-        else:
-            chosen.append(int(i))
-            sums.append(float(probabilities[i]))
-    order = np.argsort(-np.array(sums), kind="stable")
-    return {"normals": normals[chosen][order], "probabilities": np.array(sums)[order]}
+) -> tuple[IntArray, FloatArray]:
+    """Add up the probabilities of facets that are symmetric copies; sorted, likeliest first."""
+    normals, heights = hull.normals, hull.heights
+    sums: dict[int, float] = {}
+    order = _likeliest_first(hull, facets, probabilities)
+    for facet, probability in zip(facets[order], probabilities[order], strict=True):
+        same = (
+            other
+            for other in sums
+            if abs(heights[facet] - heights[other]) <= same_height
+            and sym.equivalent_directions(normals[facet], normals[other]) < SAME_FACET
+        )
+        first = next(same, int(facet))
+        sums[first] = sums.get(first, 0.0) + float(probability)
+    merged, totals = np.array(list(sums)), np.array(list(sums.values()))
+    order = _likeliest_first(hull, merged, totals)
+    return merged[order], totals[order]
+
+
+def _likeliest_first(hull: Hull, facets: IntArray, probabilities: FloatArray) -> IntArray:
+    """Order by falling probability; equal ones by vertex number, whatever the mesh's pose."""
+    corners = np.sort(hull.corners[facets], axis=1)
+    coarse = np.round(-probabilities, 6)
+    return np.lexsort((corners[:, 2], corners[:, 1], corners[:, 0], coarse))
 
 
 def _resting_pose(obj: GraspObject, down: FloatArray) -> FloatArray:
