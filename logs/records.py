@@ -97,7 +97,9 @@ class TrialDescriptor:
 
     def __post_init__(self) -> None:
         set_field = object.__setattr__
-        set_field(self, "center_of_mass", frozen_finite(self.center_of_mass, "center_of_mass", (3,)))
+        set_field(
+            self, "center_of_mass", frozen_finite(self.center_of_mass, "center_of_mass", (3,))
+        )
         set_field(self, "T_world_object", as_transform(self.T_world_object, "T_world_object"))
 
 

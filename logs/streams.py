@@ -176,10 +176,17 @@ class FrameTrack:
 
     def transforms(self) -> FloatArray:
         """T_parent_child over time, shape (N, 4, 4)."""
-        from scipy.spatial.transform import Rotation
-
-        result = np.tile(np.eye(4), (len(self.time_ns), 1, 1))
-        if len(self.time_ns):
-            result[:, :3, :3] = Rotation.from_quat(self.quaternions_xyzw).as_matrix()
-            result[:, :3, 3] = self.translations
+        x, y, z, w = self.quaternions_xyzw.T
+        result = np.zeros((len(self.time_ns), 4, 4))
+        result[:, 0, :3] = np.stack(
+            [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)], -1
+        )
+        result[:, 1, :3] = np.stack(
+            [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)], -1
+        )
+        result[:, 2, :3] = np.stack(
+            [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)], -1
+        )
+        result[:, :3, 3] = self.translations
+        result[:, 3, 3] = 1.0
         return result

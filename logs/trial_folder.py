@@ -65,10 +65,9 @@ def annotation_path(folder: Path, number: int) -> Path:
 
 
 def next_annotation_number(folder: Path) -> int:
-    """The number after the newest annotation's."""
-    paths = annotation_paths(folder)
-    match = _ANNOTATION.fullmatch(paths[-1].name) if paths else None
-    return int(match[1]) + 1 if match else 1
+    """The number after the newest annotation's, finished or not."""
+    names = (path.name.removesuffix(".part") for path in folder.iterdir())
+    return max((int(m[1]) for name in names if (m := _ANNOTATION.fullmatch(name))), default=0) + 1
 
 
 def sync_folder(folder: Path) -> None:

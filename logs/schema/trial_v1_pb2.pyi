@@ -663,7 +663,7 @@ class Label(_message.Message):
     REASON_FIELD_NUMBER: _builtins.int
     NOTE_FIELD_NUMBER: _builtins.int
     OPERATOR_FIELD_NUMBER: _builtins.int
-    WITHDRAWN_FIELD_NUMBER: _builtins.int
+    WITHDRAWS_FIELD_NUMBER: _builtins.int
     DETAILS_FIELD_NUMBER: _builtins.int
     TAKE_FIELD_NUMBER: _builtins.int
     trial_id: _builtins.str
@@ -674,8 +674,8 @@ class Label(_message.Message):
     reason: _builtins.str
     note: _builtins.str
     operator: _builtins.str
-    withdrawn: _builtins.bool
-    """an undo: this label holds no longer"""
+    withdraws: _builtins.str
+    """an undo: the event id of the label that holds no longer"""
     take: _builtins.int
     @_builtins.property
     def timestamp(self) -> _timestamp_pb2.Timestamp: ...
@@ -692,13 +692,13 @@ class Label(_message.Message):
         reason: _builtins.str = ...,
         note: _builtins.str = ...,
         operator: _builtins.str = ...,
-        withdrawn: _builtins.bool = ...,
+        withdraws: _builtins.str = ...,
         details: _abc.Mapping[_builtins.str, _builtins.str] | None = ...,
         take: _builtins.int = ...,
     ) -> None: ...
     _HasFieldArgType: _TypeAlias = _typing.Literal["timestamp", b"timestamp"]  # noqa: Y015
     def HasField(self, field_name: _HasFieldArgType) -> _builtins.bool: ...
-    _ClearFieldArgType: _TypeAlias = _typing.Literal["details", b"details", "event_id", b"event_id", "note", b"note", "operator", b"operator", "outcome", b"outcome", "reason", b"reason", "revision", b"revision", "take", b"take", "timestamp", b"timestamp", "trial_id", b"trial_id", "withdrawn", b"withdrawn"]  # noqa: Y015
+    _ClearFieldArgType: _TypeAlias = _typing.Literal["details", b"details", "event_id", b"event_id", "note", b"note", "operator", b"operator", "outcome", b"outcome", "reason", b"reason", "revision", b"revision", "take", b"take", "timestamp", b"timestamp", "trial_id", b"trial_id", "withdraws", b"withdraws"]  # noqa: Y015
     def ClearField(self, field_name: _ClearFieldArgType) -> None: ...
     def WhichOneof(self, oneof_group: _Never) -> None: ...
 
@@ -807,6 +807,26 @@ class Score(_message.Message):
         def ClearField(self, field_name: _ClearFieldArgType) -> None: ...
         def WhichOneof(self, oneof_group: _Never) -> None: ...
 
+    @_typing.final
+    class TextsEntry(_message.Message):
+        DESCRIPTOR: _descriptor.Descriptor
+
+        KEY_FIELD_NUMBER: _builtins.int
+        VALUE_FIELD_NUMBER: _builtins.int
+        key: _builtins.str
+        value: _builtins.str
+        def __init__(
+            self,
+            *,
+            key: _builtins.str = ...,
+            value: _builtins.str = ...,
+        ) -> None: ...
+        _HasFieldArgType: _TypeAlias = _Never  # noqa: Y015
+        def HasField(self, field_name: _HasFieldArgType) -> _builtins.bool: ...
+        _ClearFieldArgType: _TypeAlias = _typing.Literal["key", b"key", "value", b"value"]  # noqa: Y015
+        def ClearField(self, field_name: _ClearFieldArgType) -> None: ...
+        def WhichOneof(self, oneof_group: _Never) -> None: ...
+
     TIMESTAMP_FIELD_NUMBER: _builtins.int
     TRIAL_ID_FIELD_NUMBER: _builtins.int
     EVENT_ID_FIELD_NUMBER: _builtins.int
@@ -820,6 +840,7 @@ class Score(_message.Message):
     DETAILS_FIELD_NUMBER: _builtins.int
     PATCHES_FIELD_NUMBER: _builtins.int
     TAKE_FIELD_NUMBER: _builtins.int
+    TEXTS_FIELD_NUMBER: _builtins.int
     trial_id: _builtins.str
     event_id: _builtins.str
     revision: _builtins.int
@@ -839,6 +860,8 @@ class Score(_message.Message):
     def details(self) -> _containers.ScalarMap[_builtins.str, _builtins.float]: ...
     @_builtins.property
     def patches(self) -> _containers.RepeatedCompositeFieldContainer[Global___ContactPatch]: ...
+    @_builtins.property
+    def texts(self) -> _containers.ScalarMap[_builtins.str, _builtins.str]: ...
     def __init__(
         self,
         *,
@@ -855,10 +878,11 @@ class Score(_message.Message):
         details: _abc.Mapping[_builtins.str, _builtins.float] | None = ...,
         patches: _abc.Iterable[Global___ContactPatch] | None = ...,
         take: _builtins.int = ...,
+        texts: _abc.Mapping[_builtins.str, _builtins.str] | None = ...,
     ) -> None: ...
     _HasFieldArgType: _TypeAlias = _typing.Literal["timestamp", b"timestamp"]  # noqa: Y015
     def HasField(self, field_name: _HasFieldArgType) -> _builtins.bool: ...
-    _ClearFieldArgType: _TypeAlias = _typing.Literal["details", b"details", "event_id", b"event_id", "explanation", b"explanation", "model", b"model", "parameters", b"parameters", "patches", b"patches", "revision", b"revision", "seconds", b"seconds", "take", b"take", "timestamp", b"timestamp", "trial_id", b"trial_id", "value", b"value", "version", b"version"]  # noqa: Y015
+    _ClearFieldArgType: _TypeAlias = _typing.Literal["details", b"details", "event_id", b"event_id", "explanation", b"explanation", "model", b"model", "parameters", b"parameters", "patches", b"patches", "revision", b"revision", "seconds", b"seconds", "take", b"take", "texts", b"texts", "timestamp", b"timestamp", "trial_id", b"trial_id", "value", b"value", "version", b"version"]  # noqa: Y015
     def ClearField(self, field_name: _ClearFieldArgType) -> None: ...
     def WhichOneof(self, oneof_group: _Never) -> None: ...
 
