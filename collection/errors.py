@@ -28,6 +28,13 @@ class StationFileError(CollectionError, InvalidInputError):
     """A station file that cannot be read: unknown driver or key, wrong type, broken TOML."""
 
 
+class MissingExtraError(CollectionError):
+    """A driver whose library is an extra that is not installed."""
+
+    def __init__(self, what: str, extra: str) -> None:
+        super().__init__(f"{what} needs the extra [{extra}]: pip install 'reach-trials[{extra}]'")
+
+
 class DeviceError(CollectionError):
     """A device did not do what it was told; never a failed grasp."""
 
@@ -102,6 +109,12 @@ class NotConnectedError(RobotError):
     recovery = Recovery.RETRY
 
 
+class StoppedError(RobotError):
+    """Someone stopped the motion; it goes on when a person says so."""
+
+    recovery = Recovery.HALT
+
+
 class CameraError(DeviceError):
     """Base of the cameras' errors."""
 
@@ -116,6 +129,10 @@ class CameraNotConnectedError(CameraError):
     """A capture before connect() or after disconnect()."""
 
     recovery = Recovery.RETRY
+
+
+class CalibrationError(CollectionError, InvalidInputError):
+    """Images or poses that do not make a hand-eye calibration, or a file that does not hold one."""
 
 
 class PlanError(CollectionError):
