@@ -20,6 +20,12 @@ from reach.objects import GraspObject
 if TYPE_CHECKING:
     from reach.evaluation.cases import GraspCase
 
+SUCCESS_RULE = (
+    "Success: clear of the table by 50 mm and still held after 1 s; turning in the grasp counts as "
+    "success and is marked `rotated`."
+)
+"""The rule of this project's own trials."""
+
 
 @dataclass(frozen=True, slots=True)
 class StatedPoseError:
@@ -51,6 +57,7 @@ class Dataset:
         pose_error: what the data's station states; None if nothing is known.
         license: of the data, None if nobody stated one.
         notes: what a user of the data should know: repairs, projections, renamed grasps.
+        success_rule: what the labels mean.
     """
 
     name: str
@@ -63,6 +70,7 @@ class Dataset:
     pose_error: StatedPoseError | None = None
     license: str | None = None
     notes: tuple[str, ...] = ()
+    success_rule: str = SUCCESS_RULE
 
     def __post_init__(self) -> None:
         unknown = {trial.object_name for trial in self.trials} - set(self.objects)
@@ -152,6 +160,7 @@ def merge(datasets: Sequence[Dataset]) -> Dataset:
         pose_error=_joint_pose_error(datasets),
         license=first.license if len({one.license for one in datasets}) == 1 else None,
         notes=tuple(dict.fromkeys(note for one in datasets for note in one.notes)),
+        success_rule=" ".join(dict.fromkeys(one.success_rule for one in datasets)),
     )
 
 
