@@ -28,6 +28,7 @@ from logs.dataset_manifest import (
 )
 from logs.errors import DatasetError
 from logs.labeled_trial import LabeledTrial
+from reach.arrays import frozen
 from reach.errors import UnknownNameError
 from reach.objects import GraspObject
 
@@ -82,7 +83,7 @@ def read_dataset(folder: Path) -> Dataset:
         origin=manifest.origin,
         objects={name: _read_object(folder, manifest, name) for name in manifest.objects},
         mass_sources={name: entry.mass_source for name, entry in manifest.objects.items()},
-        gripper=gripper_of(manifest.gripper),
+        gripper=gripper_of(manifest),
         trials=_read_trials(folder, manifest),
         left_out=left_out_rows(manifest),
         pose_error=stated_pose_error(manifest),
@@ -197,7 +198,7 @@ def _read_object(folder: Path, manifest: Manifest, name: str) -> GraspObject:
     part = GraspObject(name, vertices, faces, entry.mass)
     if part.com.tolist() == list(entry.center_of_mass):
         return part
-    return replace(part, center_of_mass=entry.center_of_mass)
+    return replace(part, center_of_mass=frozen(entry.center_of_mass))
 
 
 def _read_trials(folder: Path, manifest: Manifest) -> tuple[LabeledTrial, ...]:

@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
+import json
 from typing import Literal
 
-import numpy as np
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import BaseModel, ConfigDict, Field, JsonValue
 
 from logs.dataset import Dataset, StatedPoseError
+from logs.descriptions import gripper_attachment, read_gripper
 from logs.labeled_trial import LeftOut
-from reach.arrays import FloatArray
-from reach.gripper import Box, Jaw, Pad, ParallelJawGripper
+from reach.gripper import ParallelJawGripper
 
 MANIFEST_NAME = "dataset.json"
 FRAMES = (
@@ -19,41 +19,12 @@ FRAMES = (
     "closing direction, origin on the open pad's face. World: z up."
 )
 UNITS = "m, rad, N, kg, s; time stamps are nanoseconds since the epoch"
-Matrix = tuple[tuple[float, ...], ...]
 
 
 class Entry(BaseModel):
     """Base of the manifest's parts."""
 
     model_config = ConfigDict(extra="forbid", frozen=True)
-
-
-class BoxEntry(Entry):
-    """A solid of the gripper's body."""
-
-    T_gripper_box: Matrix
-    half_extents: tuple[float, float, float]
-
-
-class JawEntry(Entry):
-    """A jaw, fully open; it travels along its pad's z axis."""
-
-    T_gripper_pad_open: Matrix
-    pad_polygon: Matrix
-    pad_thickness: float
-    pad_max_deformation: float
-    boxes: tuple[BoxEntry, ...]
-
-
-class GripperEntry(Entry):
-    """The hand; the jaws' full opening is twice the stroke."""
-
-    name: str
-    stroke: float
-    max_force: float
-    max_speed: float
-    jaws: tuple[JawEntry, ...]
-    palm: tuple[BoxEntry, ...]
 
 
 class ObjectEntry(Entry):
@@ -102,7 +73,9 @@ class Manifest(Entry):
     success_rule: str
     frames: str = FRAMES
     units: str = UNITS
-    gripper: GripperEntry
+    gripper: dict[str, JsonValue] = Field(
+        description="the hand; the jaws' full opening is twice the stroke"
+    )
     objects: dict[str, ObjectEntry]
     pose_error: PoseErrorEntry | None
     left_out: tuple[LeftOutEntry, ...]
@@ -127,10 +100,11 @@ def make_manifest(dataset: Dataset, meshes: dict[str, str], files: dict[str, str
         trials=len(dataset.trials),
         successes=dataset.successes,
         success_rule=dataset.success_rule,
-        gripper=_gripper_entry(dataset.gripper),
+        gripper=json.loads(gripper_attachment(dataset.gripper).data),
         objects=_object_entries(dataset, meshes),
-        pose_error=stated
-        and PoseErrorEntry(
+        pose_error=None
+        if stated is None
+        else PoseErrorEntry(
             translation=stated.translation, rotation=stated.rotation, basis=stated.basis
         ),
         left_out=tuple(
@@ -152,7 +126,9 @@ def make_manifest(dataset: Dataset, meshes: dict[str, str], files: dict[str, str
 def stated_pose_error(manifest: Manifest) -> StatedPoseError | None:
     """The manifest's pose error as a value."""
     entry = manifest.pose_error
-    return entry and StatedPoseError(entry.translation, entry.rotation, entry.basis)
+    if entry is None:
+        return None
+    return StatedPoseError(entry.translation, entry.rotation, entry.basis)
 
 
 def left_out_rows(manifest: Manifest) -> tuple[LeftOut, ...]:
@@ -163,20 +139,13 @@ def left_out_rows(manifest: Manifest) -> tuple[LeftOut, ...]:
     )
 
 
-def gripper_of(entry: GripperEntry) -> ParallelJawGripper:
-    """The hand that an entry describes."""
-    jaws = tuple(
-        Jaw(
-            Pad(np.array(jaw.pad_polygon), jaw.pad_thickness, jaw.pad_max_deformation),
-            np.array(jaw.T_gripper_pad_open),
-            tuple(_box(box) for box in jaw.boxes),
-        )
-        for jaw in entry.jaws
-    )
-    palm = tuple(_box(box) for box in entry.palm)
-    return ParallelJawGripper(
-        entry.name, jaws, entry.stroke, entry.max_force, entry.max_speed, palm
-    )
+def gripper_of(manifest: Manifest) -> ParallelJawGripper:
+    """The hand that the manifest describes.
+
+    Raises:
+        RecordReadError: if it describes none.
+    """
+    return read_gripper(json.dumps(manifest.gripper).encode())
 
 
 def _object_entries(dataset: Dataset, meshes: dict[str, str]) -> dict[str, ObjectEntry]:
@@ -194,36 +163,3 @@ def _object_entries(dataset: Dataset, meshes: dict[str, str]) -> dict[str, Objec
         )
         for name, part in sorted(dataset.objects.items())
     }
-
-
-def _gripper_entry(gripper: ParallelJawGripper) -> GripperEntry:
-    return GripperEntry(
-        name=gripper.name,
-        stroke=gripper.stroke,
-        max_force=gripper.max_force,
-        max_speed=gripper.max_speed,
-        jaws=tuple(
-            JawEntry(
-                T_gripper_pad_open=_rows(jaw.T_gripper_pad_open),
-                pad_polygon=_rows(jaw.pad.polygon),
-                pad_thickness=jaw.pad.thickness,
-                pad_max_deformation=jaw.pad.max_deformation,
-                boxes=tuple(_box_entry(box) for box in jaw.boxes),
-            )
-            for jaw in gripper.jaws
-        ),
-        palm=tuple(_box_entry(box) for box in gripper.palm),
-    )
-
-
-def _box_entry(box: Box) -> BoxEntry:
-    x, y, z = box.half_extents.tolist()
-    return BoxEntry(T_gripper_box=_rows(box.T_gripper_box), half_extents=(x, y, z))
-
-
-def _box(entry: BoxEntry) -> Box:
-    return Box(np.array(entry.T_gripper_box), np.array(entry.half_extents))
-
-
-def _rows(matrix: FloatArray) -> Matrix:
-    return tuple(tuple(row) for row in matrix.tolist())

@@ -80,7 +80,8 @@ def read_records(path: Path) -> list[ReadRecord]:
         raise DatasetError(f"cannot read {path}: {error}") from error
     if not isinstance(content, list) or not content:
         raise DatasetError(f"{path} holds no list of records; expected [{{'obj': ..., ...}}, ...]")
-    records, seen = [], {}
+    records: list[ReadRecord] = []
+    seen: dict[tuple[str, int, int], int] = {}
     for number, item in enumerate(content):
         one = _check(item, f"{path}: record {number}")
         key = (one.record.obj, one.record.attempt, one.record.trial)

@@ -82,6 +82,50 @@ def pressed_shares(
     Returns:
         Shape (N,).
     """
+    depth = _depths(part, gripper, jaw, T_object_gripper, opening)
+    nearest = depth.min(axis=1, keepdims=True)
+    limit = gripper.jaws[jaw].pad.max_deformation
+    shares: FloatArray = (np.isfinite(depth) & (depth <= nearest + limit)).mean(axis=1)
+    return shares
+
+
+def closed_width(
+    part: GraspObject,
+    gripper: ParallelJawGripper,
+    T_object_gripper: FloatArray,
+    opening: float | None = None,
+) -> float | None:
+    """Distance of the two pads when both touch the undeformed object [m].
+
+    Args:
+        part: the object.
+        gripper: a hand with two jaws.
+        T_object_gripper: shape (4, 4).
+        opening: of the jaws before closing [m]; fully open if None.
+
+    Returns:
+        None if a pad meets nothing.
+    """
+    travels = [
+        float(_depths(part, gripper, jaw, T_object_gripper[None], opening).min()) for jaw in (0, 1)
+    ]
+    start = gripper.max_opening if opening is None else opening
+    width = start - sum(travels)
+    return width if np.isfinite(width) and width > 0 else None
+
+
+def _depths(
+    part: GraspObject,
+    gripper: ParallelJawGripper,
+    jaw: int,
+    T_object_gripper: FloatArray,
+    opening: float | None,
+) -> FloatArray:
+    """Distance from each cell of the pad to the object, shape (N, C) [m].
+
+    Infinite where the ray meets nothing, or a face from behind; negative where the object is
+    behind the pad's nominal face.
+    """
     pad = gripper.jaws[jaw].pad
     cells = _cells(pad)
     T_object_pad = T_object_gripper @ gripper.T_gripper_pad(jaw, opening)
@@ -93,11 +137,8 @@ def pressed_shares(
     depth, face = depth.reshape(origins.shape[:2]), face.reshape(origins.shape[:2])
     facing = np.einsum("nci,ni->nc", part.face_normals[face], direction) < 0
     across = START_BEHIND + 2.0 * gripper.stroke  # to the other side of the hand
-    depth = np.where(facing & (depth <= across), depth, np.inf)
-    nearest = depth.min(axis=1, keepdims=True)
-    pressed = np.isfinite(depth) & (depth <= nearest + pad.max_deformation)
-    shares: FloatArray = pressed.mean(axis=1)
-    return shares
+    depths: FloatArray = np.where(facing & (depth <= across), depth - START_BEHIND, np.inf)
+    return depths
 
 
 @lru_cache(maxsize=8)

@@ -29,7 +29,7 @@ def reference_rows(
     pose_error: PoseError | None,
     samples: int = 30,
     seed: int = 0,
-    on_done: Callable[[int], None] | None = None,
+    progress: Callable[[int, int], None] | None = None,
 ) -> list[ScoredModel]:
     """Score all cases by the constant 1, the pads' overlap with the object, and the true rate.
 
@@ -38,7 +38,7 @@ def reference_rows(
         pose_error: what the overlap is averaged under; the planned pose alone if None.
         samples: number of perturbed poses the overlap is averaged over.
         seed: of the perturbations.
-        on_done: called with the number of grasps whose overlap is known.
+        progress: called with the number of grasps whose overlap is known, and their total.
     """
     count = len(cases)
     overlap = np.empty(count)
@@ -47,8 +47,8 @@ def reference_rows(
         overlap[i] = overlap_score(
             case.scene, case.grasp, pose_error=pose_error, samples=samples, seed=seed
         )
-        if on_done:
-            on_done(i + 1)
+        if progress:
+            progress(i + 1, count)
     seconds = (time.perf_counter() - start) / count
     rates: FloatArray = np.array([case.rate for case in cases])
     parameters: dict[str, float | bool | str] = {"samples": samples if pose_error else 1}

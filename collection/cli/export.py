@@ -1,0 +1,50 @@
+"""`reach export`: the labeled data set, in the formats that other tools load."""
+
+from __future__ import annotations
+
+from collections import Counter
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+FORMAT_HELP = "Comma-separated: parquet, csv, graspgen, isaac, acronym, reach2019; or all."
+
+
+def export(
+    sources: Annotated[list[Path], typer.Argument(help="Session or data-set folders.")],
+    to: Annotated[Path, typer.Option(help="New folder for the data set.")],
+    formats: Annotated[str, typer.Option("--format", help=FORMAT_HELP)] = "parquet,csv",
+    unblinded: Annotated[
+        bool, typer.Option(help="Let labels given after seeing a prediction replace blind ones.")
+    ] = False,
+    as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object.")] = False,
+) -> None:
+    """Write the labeled trials of one or more sessions as a data set.
+
+    Only trials that were labeled and not voided are written; the data card says how many were
+    left out and why. The same session gives the same bytes.
+
+    - `reach export sessions/monday --to data/monday`
+    - `reach export sessions/mon sessions/tue --to data/week --format all`
+    """
+    from logs.dataset_files import FORMATS, write_dataset
+    from logs.dataset_sources import load_labeled
+
+    wanted = list(FORMATS) if formats == "all" else _split(formats)
+    dataset = load_labeled(sources, unblinded=unblinded)
+    manifest = write_dataset(dataset, to, wanted)
+    if as_json:
+        print(
+            manifest.model_dump_json(include={"name", "trials", "successes", "simulated", "files"})
+        )
+        return
+    marked = " (simulated)" if manifest.simulated else ""
+    print(f"{manifest.trials} trials{marked} of {len(manifest.objects)} objects -> {to}")
+    for reason, count in sorted(Counter(row.reason for row in dataset.left_out).items()):
+        print(f"  left out: {count} {reason}")
+    print(f"  {to / 'README.md'} is the data card")
+
+
+def _split(text: str) -> list[str]:
+    return [part.strip() for part in text.split(",") if part.strip()]

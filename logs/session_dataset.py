@@ -1,0 +1,228 @@
+"""A data set from a recorded session: the journal says what counts, the records what was done."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from logs.dataset import Dataset, StatedPoseError
+from logs.errors import DatasetError
+from logs.events import LabelEvent, Outcome, Scored
+from logs.labeled_trial import Execution, Label, LabeledTrial, LeftOut, StoredScore
+from logs.record_facts import RecordFacts, read_facts
+from logs.session import SessionFolder
+from logs.state import TakeState, TrialState
+from reach.gripper import ParallelJawGripper
+from reach.objects import GraspObject
+
+_LEFT_OUT = {
+    "unlabelled": "executed, not labeled",
+    "pending": "not executed",
+    "running": "not finished",
+    "skipped": "skipped",
+}
+
+
+def session_dataset(path: Path, *, unblinded: bool = False) -> Dataset:
+    """Read the labeled trials of a session; it may be running.
+
+    Args:
+        path: the session's folder.
+        unblinded: use the newest verdict even if it was given after a prediction had been seen;
+            otherwise the newest blind one counts where there is any.
+
+    Raises:
+        NotASessionError: no session folder.
+        RecordReadError: a labeled trial's record cannot be read.
+        DatasetError: one object name with two geometries.
+    """
+    folder = SessionFolder.open(path)
+    state = folder.read_state()
+    name = path.resolve().name
+    counted = [trial for trial in state.order if trial.status == "labelled"]
+    facts = read_facts([_record_path(path, trial) for trial in counted])
+    attempts = _attempts(state.order)
+    trials = tuple(
+        _labeled_trial(trial, one, name, attempts[trial.planned.grasp_id], unblinded)
+        for trial, one in zip(counted, facts, strict=True)
+    )
+    return Dataset(
+        name=name,
+        origin=_origin(folder),
+        objects=_objects(facts),
+        mass_sources={one.descriptor.object_name: "stated in the session" for one in facts},
+        gripper=_gripper(facts),
+        trials=trials,
+        left_out=tuple(_left_out(trial, name) for trial in state.order if trial not in counted),
+        pose_error=_pose_error(trials),
+        notes=_notes(counted, unblinded),
+    )
+
+
+def _record_path(session: Path, trial: TrialState) -> Path:
+    take = trial.valid_take
+    if take is None or take.record is None:
+        raise DatasetError(f"trial {trial.trial_id} of {session} is labeled but has no record")
+    return session / take.record
+
+
+def _origin(folder: SessionFolder) -> str:
+    station = "simulated" if folder.descriptor.simulated else "real"
+    return f"Recorded on a {station} station, session {folder.descriptor.session_id}."
+
+
+def _attempts(trials: Sequence[TrialState]) -> dict[str, int]:
+    """Index of each planned grasp among its object's."""
+    grasps: dict[str, set[str]] = {}
+    for trial in trials:
+        grasps.setdefault(trial.planned.object_name, set()).add(trial.planned.grasp_id)
+    return {grasp: i for ids in grasps.values() for i, grasp in enumerate(sorted(ids))}
+
+
+def _objects(facts: Sequence[RecordFacts]) -> dict[str, GraspObject]:
+    objects: dict[str, GraspObject] = {}
+    for one in facts:
+        described = one.descriptor
+        known = objects.get(described.object_name)
+        if known is None:
+            vertices, faces = one.mesh
+            known = GraspObject(
+                described.object_name,
+                vertices,
+                faces,
+                described.object_mass,
+                described.center_of_mass,
+            )
+            objects[described.object_name] = known
+        if known.content_hash != described.object_hash:
+            raise DatasetError(
+                f"object {described.object_name!r} has another shape in {one.path} than before"
+            )
+    return objects
+
+
+def _gripper(facts: Sequence[RecordFacts]) -> ParallelJawGripper:
+    return facts[0].gripper if facts else ParallelJawGripper.yumi()
+
+
+def _labeled_trial(
+    trial: TrialState, facts: RecordFacts, session: str, attempt: int, unblinded: bool
+) -> LabeledTrial:
+    planned, described = trial.planned, facts.descriptor
+    take = trial.valid_take
+    assert take is not None
+    return LabeledTrial(
+        trial_id=trial.trial_id,
+        session=session,
+        number=planned.number,
+        object_name=planned.object_name,
+        grasp_id=planned.grasp_id,
+        attempt=attempt,
+        repeat=planned.repeat,
+        stable_pose=described.stable_pose,
+        T_world_object=described.T_world_object,
+        T_object_gripper=described.planned.T_object_gripper,
+        table_height=0.0,
+        opening=described.planned.opening,
+        force=described.planned.force,
+        label=_label(take, unblinded),
+        execution=_execution(take, facts),
+        scores={model: _score(event) for model, event in sorted(take.scores.items())},
+        takes=len(trial.takes),
+        redos=tuple(t.ended_because for t in trial.takes if t.status == "redone"),
+        voids=tuple(t.ended_because for t in trial.takes if t.status in ("voided", "interrupted")),
+        record=take.record,
+        record_sha256=facts.sha256,
+        simulated=described.simulated,
+    )
+
+
+def _chosen_label(take: TakeState, unblinded: bool) -> LabelEvent:
+    label = take.label if unblinded else take.blind_label or take.label
+    assert label is not None
+    return label
+
+
+def _label(take: TakeState, unblinded: bool) -> Label:
+    chosen = _chosen_label(take, unblinded)
+    position, entry = next(
+        (i, entry) for i, (entry, label) in enumerate(take.labels) if label is chosen
+    )
+    return Label(
+        success=chosen.outcome is Outcome.SUCCESS,
+        rotated=chosen.rotated,
+        reason=None if chosen.reason is None else chosen.reason.value,
+        operator=chosen.operator,
+        source=chosen.source.value,
+        note=chosen.note,
+        blind=chosen.blind,
+        time_ns=entry.time_ns,
+        relabeled=position,
+    )
+
+
+def _execution(take: TakeState, facts: RecordFacts) -> Execution:
+    found, done = facts.registration, facts.execution
+    width = take.sensor.jaw_width if take.sensor else None
+    measured: Mapping[str, float] = done.measurements if done else {}
+    return Execution(
+        T_world_object=None if found is None else found.T_world_object,
+        covariance=_finite(None if found is None else found.covariance),
+        T_world_gripper=None if done is None else done.T_world_gripper,
+        T_object_gripper=None if done is None else done.executed.T_object_gripper,
+        jaw_width=width if width is not None else measured.get("width"),
+        jaw_force=measured.get("force"),
+        sensor_verdict=None if done is None else done.sensor_verdict,
+        time_ns=take.executed_ns if done is None else done.time_ns,
+    )
+
+
+def _finite(covariance: Any) -> Any:
+    """A covariance with unbounded directions cannot be averaged or written as numbers."""
+    return covariance if covariance is not None and np.all(np.isfinite(covariance)) else None
+
+
+def _score(event: Scored) -> StoredScore:
+    parameters = event.details.get("parameters", {})
+    known = parameters if isinstance(parameters, dict) else {}
+    plain = {k: v for k, v in known.items() if isinstance(v, bool | int | float | str)}
+    return StoredScore(event.value, event.version, plain)
+
+
+def _left_out(trial: TrialState, session: str) -> LeftOut:
+    planned = trial.planned
+    reason = trial.needs_label or _LEFT_OUT.get(trial.status, trial.status)
+    if trial.status == "pending" and trial.takes:
+        reason = f"void, not taken again: {trial.takes[-1].ended_because}"
+    return LeftOut(
+        trial.trial_id, session, planned.number, planned.object_name, planned.grasp_id, reason
+    )
+
+
+def _pose_error(trials: Iterable[LabeledTrial]) -> StatedPoseError | None:
+    """Root mean square of the registrations' own standard deviations."""
+    covariances = [t.execution.covariance for t in trials if t.execution.covariance is not None]
+    if not covariances:
+        return None
+    variances = np.mean([np.diag(covariance) for covariance in covariances], axis=0)
+    return StatedPoseError(
+        float(np.sqrt(variances[3:].mean())),
+        float(np.sqrt(variances[:3].mean())),
+        f"root mean square of {len(covariances)} registrations' stated covariances; calibration "
+        "and actuation not included",
+    )
+
+
+def _notes(trials: Sequence[TrialState], unblinded: bool) -> tuple[str, ...]:
+    replaced = sum(
+        take is not None and take.label is not _chosen_label(take, unblinded)
+        for take in (trial.valid_take for trial in trials)
+    )
+    if not replaced:
+        return ()
+    return (
+        f"{replaced} relabels were given after a prediction had been seen; the blind label counts.",
+    )
