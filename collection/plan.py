@@ -13,11 +13,23 @@ from collections.abc import Sequence
 import numpy as np
 
 from collection.errors import DuplicateNameError, PlanError
+from collection.plan_object import plan_object
 from collection.plan_records import Plan, PlannedGrasp, PlannedObject, PlannedTrial
-from collection.plan_sampling import plan_object
 from collection.sampling import Reachable, SamplingOptions
 from reach.gripper import ParallelJawGripper
 from reach.objects import GraspObject
+from reach.stable_poses import MIN_PROBABILITY
+
+__all__ = [
+    "GRASPS_PER_OBJECT",
+    "REPEATS",
+    "Plan",
+    "PlannedGrasp",
+    "PlannedObject",
+    "PlannedTrial",
+    "make_plan",
+    "repeat_plan",
+]
 
 GRASPS_PER_OBJECT = 25
 REPEATS = 5
@@ -34,6 +46,7 @@ def make_plan(
     session: int = 0,
     reachable: Reachable | None = None,
     options: SamplingOptions | None = None,
+    min_probability: float = MIN_PROBABILITY,
     jobs: int = 1,
 ) -> Plan:
     """Plan an experiment, or a further session of one.
@@ -47,6 +60,7 @@ def make_plan(
         session: 0, 1, ...: another number gives other grasps and trials of the same experiment.
         reachable: filter of the arm, see collection.sampling.Reachable.
         options: limits of the search for grasps.
+        min_probability: stable poses below it are not planned on.
         jobs: processes that share the parts; the plan does not depend on it.
 
     Raises:
@@ -67,6 +81,7 @@ def make_plan(
             session=session,
             reachable=reachable,
             options=options,
+            min_probability=min_probability,
         )
         for obj in objects
     )

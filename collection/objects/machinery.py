@@ -31,7 +31,7 @@ def knob() -> Solid:
 
 
 def gear() -> Solid:
-    """A spur gear of 20 teeth with a hub, a keyed bore and five windows."""
+    """A spur gear of 20 teeth with a hub on one side, a bore and five windows."""
     teeth, root, tip = 20, 18.0, 22.0
     outline: list[Point2] = []
     for k in range(teeth):
@@ -41,8 +41,7 @@ def gear() -> Solid:
         outline += arc((0, 0), root, center + 5.4, center + 5.4, 1)
     wheel = plate(outline, 9) + rod(8, 17, 44)
     windows = ring_of(rod(3, 20, 22, base_mm=(12.8, 0, -4)), 5)
-    key = block((3, 4, 30), (3, -2, -5))
-    return wheel - windows - rod(4, 30, 32, base_mm=(0, 0, -5)) - key
+    return wheel - windows - rod(4, 30, 40, base_mm=(0, 0, -5))
 
 
 def mount() -> Solid:
