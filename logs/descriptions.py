@@ -27,6 +27,7 @@ GRIPPER_FRAME = "gripper"
 
 Number = Annotated[float, Field(allow_inf_nan=False)]
 Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
+Share = Annotated[float, Field(ge=0, le=1)]
 Matrix = Annotated[
     tuple[tuple[Number, Number, Number, Number], ...], Field(min_length=4, max_length=4)
 ]
@@ -47,6 +48,7 @@ class Shape(_Model):
     type: Literal["box", "sphere", "cylinder", "capsule"]
     size: Annotated[tuple[Positive, ...], Field(min_length=1, max_length=3)]
     T_link_shape: Matrix = IDENTITY
+    rgba: tuple[Share, Share, Share, Share] | None = None
 
 
 class Link(_Model):

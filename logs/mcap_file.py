@@ -19,7 +19,7 @@ from mcap_protobuf.schema import build_file_descriptor_set
 
 from logs.errors import RecordWriteError
 from logs.records import FORMAT_VERSION, AttachmentRecord
-from logs.trial_folder import sync_folder
+from logs.session import sync_directory
 
 PROFILE = "reach-trials"
 LIBRARY = f"reach-trials format {FORMAT_VERSION}"
@@ -106,7 +106,7 @@ class DurableMcap:
         if self.path.exists():
             raise RecordWriteError(f"{self.path} appeared meanwhile; kept {self.part} beside it")
         os.rename(self.part, self.path)
-        sync_folder(self.path.parent)
+        sync_directory(self.path.parent)
         return self.path
 
     def abandon(self) -> None:

@@ -1,7 +1,7 @@
 """Where a take's files are: one folder a take, holding record, annotations and view.
 
     SESSION/trials/0007_<trial id>/          first take of trial 7
-    SESSION/trials/0007_<trial id>.take2/    second take, after a redo or a void
+    SESSION/trials/0007_<trial id>_take2/    second take, after a redo or a void
         trial.mcap                           the record; trial.mcap.part until it is finished
         annotation.NNN.mcap                  one label or score each
         trial.rrd, trial.blind.rrd           views; may be deleted and rebuilt
@@ -11,7 +11,6 @@ Names are for people and for sorting: programs trust the ids inside the record.
 
 from __future__ import annotations
 
-import os
 import re
 from collections.abc import Iterator
 from pathlib import Path
@@ -22,12 +21,12 @@ PART_NAME = "trial.mcap.part"
 VIEW_NAME = "trial.rrd"
 BLIND_VIEW_NAME = "trial.blind.rrd"
 _ANNOTATION = re.compile(r"annotation\.(\d{3,})\.mcap")
-_FOLDER = re.compile(r"(\d{4,})_(.+?)(?:\.take(\d+))?")
+_FOLDER = re.compile(r"(\d{4,})_(.+?)(?:_take(\d+))?")
 
 
 def take_folder(session: Path, number: int, trial_id: str, take: int = 1) -> Path:
     """Folder of a take; not created here."""
-    suffix = "" if take == 1 else f".take{take}"
+    suffix = "" if take == 1 else f"_take{take}"
     return session / TRIALS / f"{number:04d}_{trial_id}{suffix}"
 
 
@@ -68,15 +67,6 @@ def next_annotation_number(folder: Path) -> int:
     """The number after the newest annotation's, finished or not."""
     names = (path.name.removesuffix(".part") for path in folder.iterdir())
     return max((int(m[1]) for name in names if (m := _ANNOTATION.fullmatch(name))), default=0) + 1
-
-
-def sync_folder(folder: Path) -> None:
-    """Put a folder's entries (new names, renames) on the disk."""
-    handle = os.open(folder, os.O_RDONLY | os.O_DIRECTORY)
-    try:
-        os.fsync(handle)
-    finally:
-        os.close(handle)
 
 
 def parts(session: Path) -> Iterator[Path]:

@@ -1,0 +1,110 @@
+"""A take's Rerun view: derived from its record and annotations alone, at any time again."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+import numpy as np
+
+from logs.annotation_files import read_annotations
+from logs.annotations import Annotations
+from logs.errors import ViewError
+from logs.trial_folder import BLIND_VIEW_NAME, VIEW_NAME, annotation_paths
+from logs.trial_record import TrialRecord, read_record, record_path
+
+APPLICATION = "reach-trials trial"
+
+
+def derive_rrd(folder: Path, out: Path | None = None, *, blind: bool = False) -> Path:
+    """Write a take's view.
+
+    Args:
+        folder: the take's folder.
+        out: the .rrd file; by default in the take's folder.
+        blind: leave out label, scores, contacts, the sensors' verdict and a simulation's truth.
+
+    Returns:
+        The file.
+
+    Raises:
+        RecordReadError: if the record cannot be read.
+        ViewError: if the view cannot be written.
+    """
+    path = out or view_path(folder, blind=blind)
+    sources = _newest_source(folder)
+    record = read_record(folder)
+    annotations = Annotations() if blind else read_annotations(folder)
+    temporary = path.with_name(f".{path.name}.{os.getpid()}.part")
+    try:
+        write_view(record, annotations, temporary, blind=blind)
+        # A view is as old as its newest source: so a copied or relabeled take is seen as such.
+        os.utime(temporary, ns=(sources, sources))
+        os.replace(temporary, path)
+    except OSError as error:
+        temporary.unlink(missing_ok=True)
+        raise ViewError(f"cannot write the view {path}: {error}") from error
+    return path
+
+
+def view_path(folder: Path, *, blind: bool = False) -> Path:
+    """Where a take's view is."""
+    return folder / (BLIND_VIEW_NAME if blind else VIEW_NAME)
+
+
+def fresh_view(folder: Path, *, blind: bool = False) -> Path:
+    """A take's view, derived anew only if record or annotations changed.
+
+    Raises:
+        RecordReadError: if the record cannot be read.
+        ViewError: if the view cannot be written.
+    """
+    path = view_path(folder, blind=blind)
+    if path.exists() and path.stat().st_mtime_ns == _newest_source(folder):
+        return path
+    return derive_rrd(folder, blind=blind)
+
+
+def write_view(
+    record: TrialRecord, annotations: Annotations, path: Path, *, blind: bool = False
+) -> None:
+    """Draw a record and its annotations into a file."""
+    from logs.blueprint import blind_blueprint, trial_blueprint
+    from logs.view_contacts import model_with_contacts, show_contacts
+    from logs.view_panels import show_panels
+    from logs.view_scene import object_triangles, show_scene
+    from logs.view_stage import Stage
+
+    described = record.descriptor
+    scores = annotations.newest_scores
+    triangles = object_triangles(record)
+    diameter = 0.05 if triangles is None else float(np.linalg.norm(np.ptp(triangles, axis=(0, 1))))
+    layout = (
+        blind_blueprint(record)
+        if blind
+        else trial_blueprint(record, model_with_contacts(scores), diameter)
+    )
+    stage = Stage(APPLICATION, f"{described.trial_id}-{described.take}", described.time_ns)
+    try:
+        stage.save(path, layout)
+        stage.recording.send_recording_name(_name(record, annotations))
+        show_scene(stage, record, blind=blind)
+        show_contacts(stage, scores)
+        show_panels(stage, record, annotations, blind=blind)
+    finally:
+        stage.close()
+
+
+def _name(record: TrialRecord, annotations: Annotations) -> str:
+    from logs.view_text import outcome_words
+
+    described = record.descriptor
+    label = annotations.label
+    outcome = f" {outcome_words(label)}" if label else ""
+    return f"{described.number:04d} {described.object_name}{outcome}"
+
+
+def _newest_source(folder: Path) -> int:
+    """Time of the newest change of what a view shows [ns]."""
+    sources = [record_path(folder), *annotation_paths(folder)]
+    return max(path.stat().st_mtime_ns for path in sources)

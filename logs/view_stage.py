@@ -1,0 +1,80 @@
+"""Where a view is drawn: a Rerun recording with the trial's clock."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import rerun as rr
+
+from logs.stamps import NS
+from reach.arrays import FloatArray, IntArray
+
+ELAPSED = "elapsed"
+"""Timeline: seconds since the trial's start."""
+CAPTURE_TIME = "capture_time"
+"""Timeline: the clock of capture."""
+
+
+class Stage:
+    """A recording under construction, in a file.
+
+    Args:
+        application: groups recordings that share a blueprint.
+        recording_id: unique; the same for the same trial.
+        start_ns: zero of the elapsed time [ns].
+    """
+
+    def __init__(self, application: str, recording_id: str, start_ns: int) -> None:
+        self.recording: Any = rr.RecordingStream(
+            application, recording_id=recording_id, send_properties=True
+        )
+        self.start_ns = start_ns
+        # Rerun's own clocks say when the view was derived, which nobody asks.
+        self.recording.set_log_time_enabled(False)
+        self.recording.set_log_tick_enabled(False)
+
+    def save(self, path: Path, blueprint: Any) -> None:
+        """Write everything that follows to a file, with its blueprint inside."""
+        self.recording.set_sinks(rr.FileSink(str(path)), default_blueprint=blueprint)
+
+    def close(self) -> None:
+        """Write the file's end."""
+        self.recording.disconnect()
+
+    def static(self, entity: str, *shown: Any) -> None:
+        """Show something at all times."""
+        self.recording.log(entity, *shown, static=True)
+
+    def at(self, entity: str, time_ns: int, *shown: Any) -> None:
+        """Show something from an instant on."""
+        self.recording.set_time(ELAPSED, duration=(time_ns - self.start_ns) / NS)
+        self.recording.set_time(CAPTURE_TIME, timestamp=np.datetime64(time_ns, "ns"))
+        self.recording.log(entity, *shown)
+        self.recording.reset_time()
+
+    def columns(self, entity: str, time_ns: IntArray, columns: Iterable[Any]) -> None:
+        """Show samples over time, in one piece."""
+        indexes = [
+            rr.TimeColumn(ELAPSED, duration=(time_ns - self.start_ns) / NS),
+            rr.TimeColumn(CAPTURE_TIME, timestamp=time_ns.astype("datetime64[ns]")),
+        ]
+        self.recording.send_columns(entity, indexes=indexes, columns=columns)
+
+    def poses(self, entity: str, time_ns: IntArray, T: FloatArray) -> None:
+        """Show a frame over time, T_parent_frame (N, 4, 4); before, it stands where it begins."""
+        if len(time_ns) == 0:
+            return
+        times = np.concatenate([[min(self.start_ns, int(time_ns[0]))], time_ns])
+        T = np.concatenate([T[:1], T])
+        columns = rr.Transform3D.columns(
+            translation=T[:, :3, 3], mat3x3=T[:, :3, :3].transpose(0, 2, 1).reshape(-1, 9)
+        )
+        self.columns(entity, times, columns)
+
+
+def placed(T_parent_frame: FloatArray) -> Any:
+    """A frame's pose as Rerun's transform."""
+    return rr.Transform3D(translation=T_parent_frame[:3, 3], mat3x3=T_parent_frame[:3, :3])
