@@ -58,6 +58,7 @@ class SessionController:
         clock: seconds, monotonic; also runs while the process is frozen.
         trials_left: how many more trials fit on the disk.
         disk_minimum: fewer than this many end the session.
+        disk_warning: fewer than this many are shown as a warning.
     """
 
     def __init__(
@@ -69,6 +70,7 @@ class SessionController:
         clock: Callable[[], float] = time.monotonic,
         trials_left: Callable[[], int] | None = None,
         disk_minimum: int = 2,
+        disk_warning: int = 50,
     ) -> None:
         self._journal = journal
         self._state = state
@@ -76,6 +78,7 @@ class SessionController:
         self._clock = clock
         self._trials_left = trials_left
         self._disk_minimum = disk_minimum
+        self._disk_warning = disk_warning
         self.disk_left = trials_left() if trials_left else None
         self.lights: dict[str, tuple[bool, str]] = {}
         self._changed = threading.Condition(threading.RLock())
@@ -130,6 +133,11 @@ class SessionController:
                     self._listeners.remove(listener)
 
         return forget
+
+    @property
+    def disk_low(self) -> bool:
+        """True if the operator should make room on the disk."""
+        return self.disk_left is not None and self.disk_left < self._disk_warning
 
     @property
     def may_move(self) -> bool:
@@ -222,14 +230,22 @@ class SessionController:
             self._ending = True
             self.announce()
 
-    def close(self, status: Literal["finished", "ended", "failed"], reason: str = "") -> None:
-        """End the session's writer; harmless when called twice."""
+    def close(
+        self, status: Literal["finished", "ended", "failed"] | None, reason: str = ""
+    ) -> None:
+        """End the session's writer; harmless when called twice.
+
+        Args:
+            status: how the session ended; None for a review, which is no part of it.
+            reason: why, in words.
+        """
         with self._changed:
             if self._closed:
                 return
             self._ending = True
             try:
-                self.record(ev.SessionClosed(status=status, reason=reason))
+                if status is not None:
+                    self.record(ev.SessionClosed(status=status, reason=reason))
             finally:
                 self._closed = True
                 self._journal.close()

@@ -161,6 +161,7 @@ class SessionState:
         self.control_rev = 0
         self.commands: dict[str, Entry] = {}
         self.segment = -1
+        self.opened_ns: int | None = None
         self.fingerprints: dict[str, str] = {}
         self.segments: list[ev.SessionOpened] = []
         self.closed: ev.SessionClosed | None = None
@@ -229,15 +230,17 @@ class SessionState:
             self.simulated_labels = True
         trial_id = getattr(event, "trial_id", None)
         if trial_id is None:
-            self._apply_control(event)
+            self._apply_control(entry)
         elif trial_id in self.trials:
             self._apply_trial(self.trials[trial_id], entry)
 
-    def _apply_control(self, event: AnyEvent) -> None:
+    def _apply_control(self, entry: Entry) -> None:
+        event = entry.event
         self.control_rev += 1
         match event:
             case ev.SessionOpened():
                 self._open(event)
+                self.opened_ns = entry.time_ns
             case ev.SessionClosed():
                 self.closed = event
                 self._end_running("the session ended")

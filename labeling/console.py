@@ -1,0 +1,69 @@
+"""What a console server is given: one session, who operates it, and what may be shown."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Literal
+
+from labeling.commands import Actor
+from labeling.controller import SessionController
+from labeling.pictures import PictureShelf
+from logs.state import TrialState
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class LiveView:
+    """A running Rerun stream for the embedded view.
+
+    Args:
+        url: what the viewer opens, such as `rerun+http://127.0.0.1:9876/proxy`; it shows the
+            blind blueprint.
+        source: the stream's HTTP origin, such as `http://127.0.0.1:9876`.
+    """
+
+    url: str
+    source: str
+
+
+Recordings = Callable[[TrialState], Path | None]
+
+
+def no_recording(trial: TrialState) -> Path | None:
+    """There is no recording to look at."""
+    return None
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Console:
+    """One session's console, independent of how it is drawn.
+
+    Args:
+        controller: the session's writer.
+        actor: who operates; every command of this console is theirs.
+        title: shown at the top.
+        mode: `run` a session, or `review` recorded trials.
+        pictures: what may be looked at.
+        live_view: the stream of the session under way, shown beside the keys.
+        recordings: the blind recording (.rrd) of an executed trial, for relabeling; may draw it
+            first, takes as long as it takes.
+        root: the session's folder; nothing outside it is served. None in practice.
+        simulated: the station is simulated.
+        practice: nothing is stored.
+        second: a second operator labels blindly, for agreement (review only).
+        hold_without_console: hold the session while nobody is connected.
+    """
+
+    controller: SessionController
+    actor: Actor
+    title: str
+    mode: Literal["run", "review"] = "run"
+    pictures: PictureShelf = field(default_factory=lambda: PictureShelf(None))
+    live_view: LiveView | None = None
+    recordings: Recordings = no_recording
+    root: Path | None = None
+    simulated: bool = False
+    practice: bool = False
+    second: bool = False
+    hold_without_console: bool = True

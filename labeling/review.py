@@ -1,0 +1,98 @@
+"""Finding recorded trials to label again."""
+
+from __future__ import annotations
+
+from typing import Final
+
+from pydantic import BaseModel, ConfigDict
+
+from labeling.view import View, label_view, trial_view
+from logs.events import Outcome
+from logs.state import SessionState, TakeState, TrialState
+
+DISAGREEMENT: Final = "disagreement"
+
+
+class Filter(BaseModel):
+    """Which trials to list; every given part must hold.
+
+    Args:
+        object: name of the object.
+        outcome: `success`, `failure`, or `unlabelled`.
+        margin_below: registration margin (to the best rival pose) below this.
+        disagrees_with: name of a model whose score is on the other side of one half than the
+            operator's blind label; a verdict on such a trial is not blind.
+    """
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+    object: str | None = None
+    outcome: str | None = None
+    margin_below: float | None = None
+    disagrees_with: str | None = None
+
+    @property
+    def found_by(self) -> str | None:
+        """The name under which a verdict notes how its trial was found."""
+        return DISAGREEMENT if self.disagrees_with else None
+
+
+def review_list(state: SessionState, wanted: Filter, *, hide_labels: bool) -> list[View]:
+    """The executed trials that match, in planned order.
+
+    Args:
+        state: the session.
+        wanted: what to list.
+        hide_labels: a second operator must not see the first one's verdict.
+    """
+    return [
+        _item(trial, take, hide_labels=hide_labels)
+        for trial in state.trials.values()
+        if (take := trial.valid_take) is not None and not trial.skipped
+        if matches(trial, take, wanted)
+    ]
+
+
+def matches(trial: TrialState, take: TakeState, wanted: Filter) -> bool:
+    """True if a trial is among the wanted ones."""
+    if wanted.object is not None and trial.planned.object_name != wanted.object:
+        return False
+    label = take.label
+    outcome = label.outcome.value if label else "unlabelled"
+    if wanted.outcome is not None and outcome != wanted.outcome:
+        return False
+    if wanted.margin_below is not None and not _margin_below(take, wanted.margin_below):
+        return False
+    return wanted.disagrees_with is None or disagrees(take, wanted.disagrees_with)
+
+
+def disagrees(take: TakeState, model: str) -> bool:
+    """True if a model's score and the blind label are on different sides."""
+    label = take.blind_label or take.label
+    score = take.scores.get(model)
+    if label is None or score is None:
+        return False
+    return (score.value >= 0.5) != (label.outcome is Outcome.SUCCESS)
+
+
+def models_scored(state: SessionState) -> tuple[str, ...]:
+    """Names of the models that scored any trial."""
+    names = {
+        model for trial in state.trials.values() for take in trial.takes for model in take.scores
+    }
+    return tuple(sorted(names))
+
+
+def _margin_below(take: TakeState, limit: float) -> bool:
+    registration = take.info.get("registration")
+    margin = registration.get("margin") if isinstance(registration, dict) else None
+    return isinstance(margin, (int, float)) and margin < limit
+
+
+def _item(trial: TrialState, take: TakeState, *, hide_labels: bool) -> View:
+    return {
+        **trial_view(trial, take),
+        "label": None if hide_labels else label_view(take),
+        "second_labels": sorted(take.second_labels),
+        "needs_label": trial.needs_label,
+    }

@@ -1,0 +1,184 @@
+"""What the consoles show: the state in JSON, blind to every prediction until a label is stored."""
+
+from __future__ import annotations
+
+import time
+from typing import Any, Final
+
+from labeling.console import Console
+from labeling.taxonomy import CAUSE_TEXT, KEYS, REASON_TEXT, RULE
+from logs.events import Outcome, Phase
+from logs.state import SessionState, TakeState, TrialState
+
+View = dict[str, Any]
+HISTORY_LENGTH: Final = 40
+REMEMBERED_COMMANDS: Final = 32
+
+
+def console_terms() -> View:
+    """The words and keys, the same for every session."""
+    return {
+        "rule": RULE,
+        "reasons": [{"value": value, "text": text} for value, text in REASON_TEXT.items()],
+        "causes": [{"value": value, "text": text} for value, text in CAUSE_TEXT.items()],
+        "keys": KEYS,
+    }
+
+
+def console_view(console: Console) -> View:
+    """Everything a console shows at this moment, consistent within itself."""
+    controller = console.controller
+    with controller.reading() as state:
+        counts = state.counts()
+        return {
+            "tick": controller.tick(),
+            "version": controller.version,
+            "title": console.title,
+            "mode": console.mode,
+            "operator": console.actor.operator,
+            "simulated": console.simulated,
+            "practice": console.practice,
+            "state": overall_state(state, closed=controller.closed),
+            "stopped": state.stopped,
+            "paused": state.paused,
+            "holds": dict(state.holds),
+            "control_rev": state.control_rev,
+            "lights": {
+                name: {"ok": ok, "text": text} for name, (ok, text) in controller.lights.items()
+            },
+            "counts": {name: getattr(counts, name) for name in counts.__slots__},
+            "disk_left": controller.disk_left,
+            "disk_low": controller.disk_low,
+            "success": success_by_object(state),
+            "elapsed": (time.time_ns() - state.opened_ns) / 1e9 if state.opened_ns else None,
+            "live_view": console.live_view.url if console.live_view else None,
+            "second": console.second,
+            "trial": _current(console, state),
+            "undoable": _undoable(state),
+            "history": _history(state),
+            "recent_commands": list(state.commands)[-REMEMBERED_COMMANDS:],
+            "next": _upcoming(state),
+        }
+
+
+def overall_state(state: SessionState, *, closed: bool = False) -> str:
+    """One word for the whole station."""
+    if closed or state.closed is not None:
+        return "ENDED"
+    if state.stopped:
+        return "STOPPED"
+    trial = state.current_trial
+    phase = trial.takes[-1].phase if trial and trial.takes else None
+    if phase is Phase.AWAITING_LABEL and trial is not None and trial.status == "unlabelled":
+        return phase.value  # a label is welcome in a pause as well
+    if state.holds:
+        return "HELD"
+    if state.paused:
+        return "PAUSED"
+    return phase.value if phase else "READY"
+
+
+def success_by_object(state: SessionState) -> dict[str, list[int]]:
+    """Successes and labelled trials per object."""
+    table: dict[str, list[int]] = {}
+    for trial in state.trials.values():
+        label = trial.label
+        row = table.setdefault(trial.planned.object_name, [0, 0])
+        if label is not None and trial.status == "labelled":
+            row[0] += label.outcome is Outcome.SUCCESS
+            row[1] += 1
+    return table
+
+
+def trial_view(trial: TrialState, take: TakeState) -> View:
+    """A trial as the operator may see it while a decision is due: no prediction, no sensor."""
+    planned = trial.planned
+    return {
+        "trial_id": trial.trial_id,
+        "rev": trial.rev,
+        "number": planned.number,
+        "object": planned.object_name,
+        "stable_pose": planned.stable_pose,
+        "grasp_id": planned.grasp_id,
+        "repeat": planned.repeat,
+        "take": take.take,
+        "phase": take.phase.value,
+        "status": trial.status,
+        "placed": take.placed,
+        "info": dict(take.info),
+        "recovered": take.recovered,
+    }
+
+
+def label_view(take: TakeState) -> View | None:
+    """The verdict that counts."""
+    label = take.label
+    if label is None:
+        return None
+    return {
+        "outcome": label.outcome.value,
+        "rotated": label.rotated,
+        "reason": label.reason.value if label.reason else None,
+        "note": label.note,
+        "operator": label.operator,
+        "source": label.source.value,
+    }
+
+
+def _current(console: Console, state: SessionState) -> View | None:
+    trial = state.current_trial
+    if console.mode == "review" or trial is None or not trial.takes:
+        return None
+    take = trial.takes[-1]
+    return {
+        **trial_view(trial, take),
+        "of": len(state.trials),
+        "pictures": list(console.pictures.names(trial.trial_id, take.take)),
+    }
+
+
+def _undoable(state: SessionState) -> View | None:
+    found = state.last_decision()
+    if found is None:
+        return None
+    trial, entry = found
+    return {
+        "trial_id": trial.trial_id,
+        "rev": trial.rev,
+        "number": trial.planned.number,
+        "kind": entry.event.kind,
+    }
+
+
+def _history(state: SessionState) -> list[View]:
+    settled = [
+        (trial, take)
+        for trial in state.trials.values()
+        if (
+            take := trial.valid_take or (trial.takes[-1] if trial.skipped and trial.takes else None)
+        )
+    ]
+    settled.sort(key=lambda pair: pair[1].executed_ns or 0, reverse=True)
+    return [_settled(trial, take) for trial, take in settled[:HISTORY_LENGTH]]
+
+
+def _settled(trial: TrialState, take: TakeState) -> View:
+    shown: View = {
+        "trial_id": trial.trial_id,
+        "rev": trial.rev,
+        "number": trial.planned.number,
+        "object": trial.planned.object_name,
+        "take": take.take,
+        "status": trial.status,
+        "label": label_view(take),
+    }
+    if trial.status == "labelled":  # only now may a prediction be seen
+        shown["sensor_lifted"] = take.sensor.lifted if take.sensor else None
+        shown["scores"] = {model: score.value for model, score in take.scores.items()}
+    return shown
+
+
+def _upcoming(state: SessionState) -> View | None:
+    waiting = (trial for trial in state.trials.values() if trial.status == "pending")
+    trial = next(waiting, None)
+    return {"number": trial.planned.number, "object": trial.planned.object_name} if trial else None

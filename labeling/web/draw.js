@@ -1,0 +1,154 @@
+// Draws a view into the page. Text only ever enters as text, never as markup.
+
+export const byId = (id) => document.getElementById(id);
+
+export function element(tag, properties = {}, ...children) {
+  const made = Object.assign(document.createElement(tag), properties);
+  made.append(...children);
+  return made;
+}
+
+const words = (value) => String(value ?? "").replaceAll("_", " ");
+const show = (id, visible) => { byId(id).hidden = !visible; };
+const text = (id, value) => { byId(id).textContent = value; };
+
+const BANNERS = {
+  READY: () => ["Getting ready", "The session's next trial comes up."],
+  PLACE_OBJECT: (trial) => [`Place: ${trial.object}`, trial.placed ? "Placed; the robot takes over." : "Put it down as in the picture, hands away, then confirm."],
+  CAPTURE: () => ["Looking", "The camera takes a depth image."],
+  REGISTER: () => ["Finding the object", "The mesh is fitted to the image."],
+  CONFIRM_POSE: () => ["Which pose is right?", "Two poses explain the image equally well."],
+  EXECUTE: () => ["The robot moves", "Keep clear. Watch whether the object is held."],
+  AWAITING_LABEL: (trial) => ["Was it stably lifted?", trial.recovered ? "This record was saved after a crash; label it if you saw it, else redo." : "Clear of the table by 50 mm and still held after 1 s."],
+  RESET: () => ["Going home", "The robot opens its jaws and leaves the table."],
+  PAUSED: () => ["Paused", "Nothing new starts until you resume."],
+  STOPPED: () => ["STOPPED", "Nothing moves until the stop is cleared."],
+  ENDED: () => ["The session has ended", ""],
+  LOST: () => ["Connection lost", ""],
+};
+
+export function drawSession(view, alive) {
+  text("title", view.title);
+  text("operator", view.operator);
+  show("badge-practice", view.practice);
+  show("badge-simulated", view.simulated);
+  const { counts } = view;
+  text("count-labelled", counts.labelled);
+  text("count-planned", counts.planned);
+  text("count-unlabelled", counts.unlabelled);
+  text("count-again", `${counts.redone} / ${counts.voided}`);
+  text("count-skipped", counts.skipped);
+  text("count-success", counts.labelled ? `${Math.round((100 * counts.successes) / counts.labelled)} %` : "–");
+  text("count-disk", view.disk_left === null ? "–" : view.disk_left > 9999 ? "> 9999" : view.disk_left);
+  byId("disk").classList.toggle("low", view.disk_low);
+  byId("progress").firstElementChild.style.width = `${(100 * counts.labelled) / Math.max(counts.planned, 1)}%`;
+  for (const name of ["robot", "camera"]) {
+    const light = view.lights[name];
+    const health = !alive ? "bad" : light ? (light.ok ? "good" : "bad") : "unknown";
+    byId(`light-${name}`).dataset.light = health;
+    byId(`light-${name}`).title = !alive ? "not known: the connection is lost" : light?.text ?? "";
+  }
+  byId("light-connection").dataset.light = alive ? "good" : "bad";
+  drawSuccess(view.success);
+}
+
+export function drawTime(seconds) {
+  const whole = Math.max(0, Math.floor(seconds));
+  const pad = (value) => String(value).padStart(2, "0");
+  text("count-time", `${Math.floor(whole / 3600)}:${pad(Math.floor(whole / 60) % 60)}:${pad(whole % 60)}`);
+}
+
+function drawSuccess(success) {
+  const rows = Object.entries(success).map(([name, [good, all]]) => element("tr", {},
+    element("td", {}, words(name), bar(good / Math.max(all, 1))),
+    element("td", {}, all ? `${good} of ${all}` : "–")));
+  byId("success").tBodies[0].replaceChildren(...rows);
+}
+
+function bar(share) {
+  const filled = element("span");
+  filled.style.width = `${100 * share}%`;
+  return element("div", { className: "bar" }, filled);
+}
+
+export function drawBanner(state, trial, view, problem) {
+  document.body.dataset.state = state;
+  let [title, more] = state === "HELD"
+    ? ["The station holds", Object.values(view.holds).join("; ")]
+    : BANNERS[state](trial ?? {});
+  if (state === "LOST") more = problem || "Keys do nothing until it is back. The robot finishes its motion and holds.";
+  if (state === "STOPPED" || state === "PAUSED") more = [more, ...Object.values(view.holds)].join(" ");
+  if (view?.paused && state === "AWAITING_LABEL") more += " (The session is paused.)";
+  text("banner-title", title);
+  text("banner-text", more);
+  show("clear-stop", state === "STOPPED");
+}
+
+export function drawRelabelBanner(trial) {
+  document.body.dataset.target = trial ? "relabel" : "";
+  show("cancel-target", Boolean(trial));
+  if (!trial) return;
+  text("banner-title", `Label trial ${trial.number} again: ${trial.object}`);
+  text("banner-text", trial.label ? `It says ${describeLabel(trial.label)}.` : "It has no label now.");
+}
+
+export function drawTrial(trial, state) {
+  text("trial-number", trial?.number ?? "–");
+  text("trial-of", trial?.of ?? "–");
+  text("trial-take", trial && trial.take > 1 ? `, take ${trial.take}` : "");
+  text("trial-object", words(trial?.object ?? "–"));
+  text("trial-pose", trial && trial.stable_pose !== null ? `resting pose ${trial.stable_pose}` : "");
+  const steps = [...byId("steps").children];
+  const phase = trial?.phase === "CONFIRM_POSE" ? "REGISTER" : trial?.phase;
+  const now = steps.findIndex((step) => step.dataset.phase === phase);
+  steps.forEach((step, index) => {
+    step.classList.toggle("past", index < now);
+    step.classList.toggle("now", index === now && state !== "LOST");
+  });
+  drawRegistration(trial?.phase === "PLACE_OBJECT" ? null : trial?.info?.registration);
+}
+
+function drawRegistration(registration) {
+  show("registration", Boolean(registration));
+  if (!registration) return;
+  const numbers = Object.entries(registration).flatMap(([name, value]) => [
+    element("dt", { textContent: words(name) }),
+    element("dd", {
+      textContent: typeof value === "number" ? value.toPrecision(3) : words(Array.isArray(value) ? value.join(", ") || "none" : value),
+      className: value === true && name === "ambiguous" ? "poor" : "",
+    })]);
+  byId("registration-numbers").replaceChildren(...numbers);
+}
+
+export function describeLabel(label) {
+  if (!label) return "unlabeled";
+  const rotated = label.rotated ? ", rotated" : "";
+  return label.outcome === "success" ? `success${rotated}` : `failure: ${words(label.reason)}`;
+}
+
+export function trialItem(trial, chosen, onChoose) {
+  const scores = trial.scores && Object.keys(trial.scores).length
+    ? element("small", { textContent: Object.entries(trial.scores).map(([model, value]) => `${model} ${value.toFixed(2)}`).join("  ") })
+    : "";
+  const mark = element("span", { className: "mark", textContent: trial.status === "skipped" ? "skipped" : describeLabel(trial.label) });
+  const button = element("button", { type: "button" },
+    element("span", {}, `${trial.number} ${words(trial.object)}`, scores), mark);
+  button.addEventListener("click", () => { button.blur(); onChoose(trial); });
+  const outcome = trial.status === "skipped" ? "skipped" : trial.label?.outcome ?? "unlabelled";
+  const item = element("li", { className: outcome }, button);
+  button.classList.toggle("chosen", chosen);
+  return item;
+}
+
+let receiptTimer = 0;
+
+export function receipt(kind, message, seconds = 2.2) {
+  const output = byId("receipt");
+  output.dataset.kind = kind;
+  output.textContent = message;
+  clearTimeout(receiptTimer);
+  receiptTimer = setTimeout(() => { output.dataset.kind = "none"; }, seconds * 1000);
+  document.body.classList.remove("flash-stored", "flash-refused");
+  void document.body.offsetWidth; // restarts the animation
+  document.body.classList.add(`flash-${kind}`);
+}

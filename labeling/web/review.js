@@ -1,0 +1,80 @@
+// Choosing recorded trials to label again: a filter, a list, and which one is on the stage.
+
+import { byId, element, trialItem } from "/draw.js";
+
+export class Review {
+  constructor(link, onChange) {
+    this.link = link;
+    this.onChange = onChange;
+    this.trials = [];
+    this.place = 0;
+    this.foundBy = null;
+    this.version = -1;
+    byId("filter").addEventListener("change", () => { this.place = 0; this.load(); });
+    byId("filter").addEventListener("submit", (event) => event.preventDefault());
+  }
+
+  chosen() {
+    return this.trials[this.place] ?? null;
+  }
+
+  shown(view) {
+    const trial = this.chosen();
+    return trial ? { ...trial, of: view.counts.planned } : null;
+  }
+
+  refresh(view) {
+    byId("review").hidden = false;
+    if (this.version === view.version) return;
+    this.version = view.version;
+    this.load();
+  }
+
+  async load() {
+    const wanted = new URLSearchParams();
+    for (const [name, value] of new FormData(byId("filter"))) if (value) wanted.set(name, value);
+    const found = await this.link.json(`/api/review?${wanted}`).catch(() => null);
+    if (!found) return;
+    const kept = this.chosen()?.trial_id;
+    this.trials = found.trials;
+    this.foundBy = found.found_by;
+    const again = this.trials.findIndex((trial) => trial.trial_id === kept);
+    this.place = again >= 0 ? again : Math.min(this.place, Math.max(this.trials.length - 1, 0));
+    options("object", found.objects);
+    options("disagrees_with", found.models);
+    byId("unblind").hidden = !this.foundBy;
+    this.draw();
+    this.onChange();
+  }
+
+  // After a verdict: the following trial, unless the verdict took this one out of the list.
+  next() {
+    this.place = Math.min(this.place + 1, Math.max(this.trials.length - 1, 0));
+    this.draw();
+  }
+
+  key(key) {
+    const step = { ArrowDown: 1, ArrowRight: 1, ArrowUp: -1, ArrowLeft: -1 }[key];
+    if (!step) return;
+    this.place = Math.min(Math.max(this.place + step, 0), Math.max(this.trials.length - 1, 0));
+    this.draw();
+    this.onChange();
+  }
+
+  draw() {
+    const items = this.trials.map((trial, index) => trialItem(trial, index === this.place, () => {
+      this.place = index;
+      this.draw();
+      this.onChange();
+    }));
+    byId("review-list").replaceChildren(...items);
+    byId("review-list").querySelector(".chosen")?.scrollIntoView({ block: "nearest" });
+  }
+}
+
+function options(name, values) {
+  const select = byId("filter").elements[name];
+  const have = select.value;
+  select.replaceChildren(element("option", { value: "", textContent: "any" }), ...values.map((value) => element("option", { value, textContent: value })));
+  select.value = have;
+}
