@@ -16,8 +16,9 @@ from reach.cache import cache_key, cached_arrays
 from reach.objects import GraspObject
 
 VERSION = 1
-CONCAVITY = 0.04
-"""CoACD's concavity threshold: 0.04 keeps a mug's handle at about 20 parts ([Wei2022])."""
+CONCAVITY = 0.05
+"""CoACD's concavity threshold, in parts of the diameter: how much hollow a part may fill."""
+MOST_PARTS = 48
 NEARLY_CONVEX = 5e-3
 """An object that fills its hull but for this share of the volume is its hull."""
 
@@ -35,7 +36,7 @@ def convex_parts(obj: GraspObject) -> tuple[ConvexPart, ...]:
 
     Source: [Wei2022] approximate convex decomposition with collision-aware concavity (CoACD).
     """
-    key = cache_key("convex-parts", VERSION, obj.content_hash, CONCAVITY, NEARLY_CONVEX)
+    key = cache_key("convex-parts", VERSION, obj.content_hash, CONCAVITY, MOST_PARTS, NEARLY_CONVEX)
     entry = cached_arrays("decomposition", key, lambda: _packed(_decompose(obj)))
     vertices = np.split(entry["vertices"], entry["vertex_splits"])
     faces = np.split(entry["faces"], entry["face_splits"])
@@ -55,8 +56,12 @@ def _decompose(obj: GraspObject) -> list[tuple[NDArray[Any], NDArray[Any]]]:
     parts = coacd.run_coacd(
         coacd.Mesh(obj.vertices / scale, obj.faces.astype(np.int32)),
         threshold=CONCAVITY,
-        seed=0,
+        max_convex_hull=MOST_PARTS,
+        resolution=1000,
+        mcts_nodes=10,
+        mcts_iterations=60,
         max_ch_vertex=64,
+        seed=0,
     )
     return [(np.asarray(v) * scale, np.asarray(f)) for v, f in parts]
 

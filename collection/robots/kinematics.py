@@ -1,0 +1,91 @@
+"""Forward kinematics and Jacobians of a serial arm, for many configurations at once."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from reach.arrays import FloatArray, frozen
+from reach.transforms import make_transform, rotation_about
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class SerialChain:
+    """Revolute joints one after the other, each about its own z axis.
+
+    Args:
+        T_parent_joint: fixed pose of each joint in its parent link, shape (J, 4, 4).
+        T_last_tip: pose of the tip's frame in the last link, shape (4, 4).
+        lower: joint limits, shape (J,) [rad].
+        upper: joint limits, shape (J,) [rad].
+        max_speed: shape (J,) [rad/s].
+    """
+
+    T_parent_joint: FloatArray
+    T_last_tip: FloatArray
+    lower: FloatArray
+    upper: FloatArray
+    max_speed: FloatArray
+
+    def __len__(self) -> int:
+        return len(self.lower)
+
+    def link_frames(self, joints: FloatArray) -> FloatArray:
+        """Poses T_base_link of all links, and last the tip's, shape (..., J + 1, 4, 4).
+
+        Args:
+            joints: shape (..., J) [rad].
+        """
+        cosine, sine = np.cos(joints), np.sin(joints)
+        frames = np.empty((*joints.shape[:-1], len(self) + 1, 4, 4))
+        T = np.broadcast_to(np.eye(4), (*joints.shape[:-1], 4, 4))
+        for number in range(len(self)):
+            fixed = T @ self.T_parent_joint[number]
+            c, s = cosine[..., number, None], sine[..., number, None]
+            T = fixed.copy()  # times a rotation about z
+            T[..., :, 0] = fixed[..., :, 0] * c + fixed[..., :, 1] * s
+            T[..., :, 1] = fixed[..., :, 1] * c - fixed[..., :, 0] * s
+            frames[..., number, :, :] = T
+        frames[..., -1, :, :] = T @ self.T_last_tip
+        return frames
+
+    def forward(self, joints: FloatArray) -> FloatArray:
+        """Pose T_base_tip of the tip, shape (..., 4, 4)."""
+        tip: FloatArray = self.link_frames(joints)[..., -1, :, :]
+        return tip
+
+    def jacobian(self, frames: FloatArray) -> FloatArray:
+        """Jacobian of the tip in the base's axes, rotation first, shape (..., 6, J).
+
+        Args:
+            frames: from `link_frames`, shape (..., J + 1, 4, 4).
+        """
+        axes = frames[..., :-1, :3, 2]
+        arms = frames[..., -1:, :3, 3] - frames[..., :-1, :3, 3]
+        return np.concatenate(
+            [np.swapaxes(axes, -1, -2), np.swapaxes(np.cross(axes, arms), -1, -2)], axis=-2
+        )
+
+    def within_limits(self, joints: FloatArray, tolerance: float = 1e-9) -> bool:
+        """Whether a configuration (J,) respects every limit."""
+        low, high = self.lower - tolerance, self.upper + tolerance
+        return bool(np.all(joints >= low) and np.all(joints <= high))
+
+
+def from_table(
+    rows: list[tuple[tuple[float, float, float], tuple[float, float, float], float, float, float]],
+    T_last_tip: FloatArray,
+) -> SerialChain:
+    """Build a chain from rows of (xyz [m], roll-pitch-yaw [rad], lower, upper, max speed)."""
+    poses = [
+        make_transform(
+            rotation_about((0, 0, 1), yaw)
+            @ rotation_about((0, 1, 0), pitch)
+            @ rotation_about((1, 0, 0), roll),
+            xyz,
+        )
+        for xyz, (roll, pitch, yaw), *_ in rows
+    ]
+    lower, upper, speed = (frozen([row[k] for row in rows]) for k in (2, 3, 4))
+    return SerialChain(frozen(poses), frozen(T_last_tip), lower, upper, speed)

@@ -1,0 +1,314 @@
+"""The trial motion: the laboratory's recipe, for any arm and hand."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
+
+import numpy as np
+
+from collection.clock import Clock
+from collection.errors import CollisionStopError, RobotError
+from collection.robots.execution import (
+    Execution,
+    Phase,
+    PhaseEvent,
+    PhaseSpan,
+    SensorVerdict,
+    TraceSample,
+)
+from collection.robots.motion_settings import MotionSettings
+from collection.robots.protocol import (
+    Arm,
+    ArmSample,
+    GripperDevice,
+    GripperSample,
+    Path,
+    Speed,
+    Waypoint,
+)
+from collection.robots.waypoints import (
+    approach_pose,
+    avoidance_pose,
+    lift_pose,
+    shake_poses,
+    trial_waypoints,
+)
+from reach.arrays import BoolArray, FloatArray, frozen
+from reach.transforms import make_transform
+
+HOLD_PERIOD = 0.04
+"""Between two readings while nothing moves [s]."""
+PUT_DOWN_SHORT = 0.002
+"""The hand stops this far above the grasp, so that the part is not pressed into the table [m]."""
+RECOVERY_LIFT = 0.050
+"""After a collision the arm first clears its path upward [m]."""
+
+EventListener = Callable[[PhaseEvent], None]
+SampleListener = Callable[[TraceSample], None]
+
+
+def reachable_grasps(
+    arm: Arm, T_world_gripper: FloatArray, settings: MotionSettings | None = None
+) -> BoolArray:
+    """Which grasps (N, 4, 4) the arm reaches, with their approach and lift, shape (N,)."""
+    settings = settings or MotionSettings()
+    T = np.asarray(T_world_gripper).reshape(-1, 4, 4)
+    result = np.ones(len(T), dtype=bool)
+    for pose_of in (lambda each: each, approach_pose, lift_pose):
+        open_ = np.flatnonzero(result)
+        if len(open_):
+            poses = np.array([_pose(pose_of, T[n], settings) for n in open_])
+            result[open_] = arm.reachable(poses)
+    return result
+
+
+def dry_run(arm: Arm, T_world_gripper: FloatArray, settings: MotionSettings | None = None) -> None:
+    """Check the whole way of a trial from where the arm is, before anything moves.
+
+    Raises:
+        UnreachableError: some of it is out of reach.
+        UnsafeMotionError: some of it would touch the table or the robot itself.
+    """
+    arm.check(trial_waypoints(T_world_gripper, settings or MotionSettings()))
+
+
+def execute_grasp(
+    arm: Arm,
+    gripper: GripperDevice,
+    T_world_gripper: FloatArray,
+    clock: Clock,
+    *,
+    settings: MotionSettings | None = None,
+    on_event: EventListener | None = None,
+    on_sample: SampleListener | None = None,
+) -> Execution:
+    """Grasp, lift, hold, put back; dry-run first, and leave the robot stopped if it fails.
+
+    Args:
+        arm: connected and ready.
+        gripper: connected.
+        T_world_gripper: the grasp, shape (4, 4).
+        clock: of the station.
+        settings: distances, speeds, force.
+        on_event: called when a phase begins.
+        on_sample: called with every reading.
+
+    Raises:
+        RobotError: whatever stopped the motion; arm and hand are then stopped, a held part
+            still held.
+    """
+    recorder = _Recorder(clock, gripper, on_event, on_sample)
+    finished = False
+    try:
+        execution = _run(
+            arm, gripper, frozen(T_world_gripper), settings or MotionSettings(), recorder
+        )
+        finished = True
+    finally:
+        if not finished:
+            make_safe(arm, gripper)
+    return execution
+
+
+def make_safe(arm: Arm, gripper: GripperDevice) -> None:
+    """Stop arm and hand, whatever state they are in."""
+    for stop in (arm.stop, gripper.stop):
+        with suppress(RobotError):  # a lost controller has stopped already, and cannot be told
+            stop()
+
+
+def recover(arm: Arm, gripper: GripperDevice, settings: MotionSettings | None = None) -> None:
+    """After a failed motion: clear the error, clear the path upward, open, and go home.
+
+    Raises:
+        RobotError: if only a person can help (emergency stop, manual mode, lost connection).
+    """
+    settings = settings or MotionSettings()
+    arm.clear_error()
+    with suppress(RobotError):  # at the end of its reach it goes home from where it is
+        up = make_transform(None, (0, 0, RECOVERY_LIFT)) @ arm.pose()
+        arm.move_to_pose(up, path=Path.LINEAR, speed=settings.careful())
+    arm.clear_error()
+    if not gripper.state().calibrated:
+        gripper.calibrate()
+    gripper.open()
+    arm.home(speed=settings.transit())
+
+
+def _run(
+    arm: Arm,
+    gripper: GripperDevice,
+    T_world_gripper: FloatArray,
+    settings: MotionSettings,
+    recorder: _Recorder,
+) -> Execution:
+    start_ns = recorder.clock.now_ns()
+    waypoints = {each.name: each for each in trial_waypoints(T_world_gripper, settings)}
+
+    def move(name: str, speed: Speed, *, guarded: bool = False) -> None:
+        waypoint: Waypoint = waypoints[name]
+        arm.move_to_pose(
+            waypoint.T_world_gripper,
+            path=waypoint.path,
+            speed=speed,
+            guarded=guarded,
+            on_sample=recorder.arm_sample,
+        )
+
+    with recorder.phase(Phase.CHECK):
+        arm.check(list(waypoints.values()))
+    with recorder.phase(Phase.OPEN):
+        gripper.open()
+    with recorder.phase(Phase.AVOIDANCE):
+        move("avoidance", settings.transit())
+    with recorder.phase(Phase.APPROACH):
+        move("approach", settings.transit())
+    with recorder.phase(Phase.DESCEND):
+        move("grasp", settings.careful(), guarded=True)
+    with recorder.phase(Phase.CLOSE):
+        T_closed, joints = arm.pose(), arm.joints()
+        recorder.arm_rests(joints, T_closed)
+        closed = gripper.close(settings.closing_force, on_sample=recorder.gripper_sample)
+    with recorder.phase(Phase.LIFT):
+        move("lift", settings.lifting())
+    with recorder.phase(Phase.HOLD):
+        recorder.arm_rests(arm.joints(), arm.pose())
+        recorder.watch_hand(settings.hold_time)
+    if settings.shake:
+        with recorder.phase(Phase.SHAKE):
+            _shake(arm, gripper, waypoints["lift"].T_world_gripper, settings, recorder)
+    held = gripper.read()
+    lifted = held.width > settings.held_width and held.force > settings.held_force
+    verdict = SensorVerdict(lifted, closed.width, held.width, held.force)
+    put_down_early = _return(arm, gripper, T_world_gripper, settings, recorder, lifted=lifted)
+    return Execution(
+        T_world_gripper_planned=T_world_gripper,
+        T_world_gripper=frozen(T_closed),
+        phases=tuple(recorder.phases),
+        samples=tuple(recorder.samples),
+        sensor_verdict=verdict,
+        start_ns=start_ns,
+        end_ns=recorder.clock.now_ns(),
+        put_down_early=put_down_early,
+    )
+
+
+def _shake(
+    arm: Arm,
+    gripper: GripperDevice,
+    T_world_lift: FloatArray,
+    settings: MotionSettings,
+    recorder: _Recorder,
+) -> None:
+    for T in shake_poses(T_world_lift, gripper.geometry, settings):
+        arm.move_to_pose(
+            T, path=Path.LINEAR, speed=settings.transit(), on_sample=recorder.arm_sample
+        )
+
+
+def _return(
+    arm: Arm,
+    gripper: GripperDevice,
+    T_world_gripper: FloatArray,
+    settings: MotionSettings,
+    recorder: _Recorder,
+    *,
+    lifted: bool,
+) -> bool:
+    """Put a held part down where it was and let go; returns whether it met the table early."""
+    met_table = False
+    retreat = lift_pose(T_world_gripper, settings)
+    with recorder.phase(Phase.RETURN):
+        if lifted:
+            down = make_transform(None, (0, 0, PUT_DOWN_SHORT)) @ T_world_gripper
+            met_table = _put_down(arm, frozen(down), settings, recorder)
+    with recorder.phase(Phase.RELEASE):
+        gripper.open(on_sample=recorder.gripper_sample)
+    with recorder.phase(Phase.RETREAT):
+        if lifted and not met_table:
+            retreat = approach_pose(T_world_gripper, settings)
+            _rise(arm, retreat, settings.careful(), recorder)
+        _rise(arm, avoidance_pose(retreat, settings), settings.transit(), recorder)
+    return met_table
+
+
+def _put_down(arm: Arm, T: FloatArray, settings: MotionSettings, recorder: _Recorder) -> bool:
+    try:
+        arm.move_to_pose(
+            T,
+            path=Path.LINEAR,
+            speed=settings.careful(),
+            guarded=True,
+            on_sample=recorder.arm_sample,
+        )
+    except CollisionStopError:
+        arm.clear_error()  # a part that turned or slipped stands on the table: let go here
+        return True
+    return False
+
+
+def _rise(arm: Arm, T: FloatArray, speed: Speed, recorder: _Recorder) -> None:
+    arm.move_to_pose(T, path=Path.LINEAR, speed=speed, on_sample=recorder.arm_sample)
+
+
+def _pose(
+    pose_of: Callable[..., FloatArray], T: FloatArray, settings: MotionSettings
+) -> FloatArray:
+    return pose_of(T) if pose_of.__name__ == "<lambda>" else pose_of(T, settings)
+
+
+class _Recorder:
+    """Collects phases and readings, and passes them on."""
+
+    def __init__(
+        self,
+        clock: Clock,
+        gripper: GripperDevice,
+        on_event: EventListener | None,
+        on_sample: SampleListener | None,
+    ) -> None:
+        self.clock = clock
+        self.phases: list[PhaseSpan] = []
+        self.samples: list[TraceSample] = []
+        self._gripper = gripper
+        self._on_event = on_event
+        self._on_sample = on_sample
+        self._joints: FloatArray = frozen(np.zeros(0))
+        self._T_world_gripper: FloatArray = make_transform()
+
+    @contextmanager
+    def phase(self, phase: Phase) -> Iterator[None]:
+        """Mark the beginning and end of a phase."""
+        start_ns = self.clock.now_ns()
+        if self._on_event is not None:
+            self._on_event(PhaseEvent(phase, start_ns))
+        yield
+        self.phases.append(PhaseSpan(phase, start_ns, self.clock.now_ns()))
+
+    def arm_rests(self, joints: FloatArray, T_world_gripper: FloatArray) -> None:
+        """Remember where the arm is while only the hand is read."""
+        self._joints, self._T_world_gripper = frozen(joints), frozen(T_world_gripper)
+
+    def arm_sample(self, sample: ArmSample) -> None:
+        """Record a reading of the moving arm, with one of the hand."""
+        self.arm_rests(sample.joints, sample.T_world_gripper)
+        self._add(sample.time_ns, self._gripper.read())
+
+    def gripper_sample(self, sample: GripperSample) -> None:
+        """Record a reading of the moving jaws; the arm rests."""
+        self._add(sample.time_ns, sample)
+
+    def watch_hand(self, seconds: float) -> None:
+        """Read the hand for some time while nothing moves."""
+        end_ns = self.clock.now_ns() + round(seconds * 1e9)
+        while self.clock.now_ns() < end_ns:
+            self.clock.sleep(min(HOLD_PERIOD, (end_ns - self.clock.now_ns()) * 1e-9))
+            sample = self._gripper.read()
+            self._add(sample.time_ns, sample)
+
+    def _add(self, time_ns: int, hand: GripperSample) -> None:
+        sample = TraceSample(time_ns, self._joints, self._T_world_gripper, hand.width, hand.force)
+        self.samples.append(sample)
+        if self._on_sample is not None:
+            self._on_sample(sample)

@@ -1,0 +1,280 @@
+"""The simulated arm: plans like a real one, moves a hand through simulated physics."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Self
+
+import numpy as np
+
+from collection.errors import (
+    CollisionStopError,
+    EmergencyStopError,
+    JointLimitError,
+    RobotError,
+    StoppedError,
+)
+from collection.faults import FaultKind, scripted
+from collection.robots.planner import ArmPlanner, JointPath
+from collection.robots.protocol import (
+    ArmListener,
+    ArmSample,
+    ArmState,
+    Motion,
+    Path,
+    RobotDescription,
+    Speed,
+    Waypoint,
+)
+from collection.robots.simulated_controller import SimulatedController
+from reach.arrays import BoolArray, FloatArray, frozen
+from reach.transforms import inverse, rotation_angle
+
+CONTROL_PERIOD = 4e-3
+"""Between two targets of the wrist while physics is stepped [s]."""
+PEAK_OVER_MEAN = 1.5
+"""Of the cubic speed profile."""
+
+
+class SimulatedArm:
+    """One simulated YuMi arm.
+
+    Args:
+        planner: its kinematics.
+        controller: shared with the hand.
+    """
+
+    def __init__(self, planner: ArmPlanner, controller: SimulatedController) -> None:
+        self._planner = planner
+        self._controller = controller
+        self._simulation = controller.simulation
+        self._joints: FloatArray = np.array(planner.arm.home)
+        self._prepared: list[tuple[Waypoint, JointPath]] = []
+
+    @property
+    def name(self) -> str:
+        """Of the arm, for logs."""
+        return f"simulated YuMi, {self._planner.arm.side} arm"
+
+    @property
+    def description(self) -> RobotDescription:
+        """Limits and shape; readable while disconnected."""
+        return self._planner.description
+
+    def connect(self) -> None:
+        """Reach the simulated controller."""
+        self._controller.connect("arm")
+        self._simulation.joints = frozen(self._joints)
+        self._simulation.move_hand(self._planner.forward(self._joints))
+
+    def disconnect(self) -> None:
+        """Let go of the controller."""
+        self._controller.disconnect("arm")
+
+    def __enter__(self) -> Self:
+        self.connect()
+        return self
+
+    def __exit__(self, *exception: object) -> None:
+        self.disconnect()
+
+    def state(self) -> ArmState:
+        """What the controller says of itself."""
+        return self._controller.state("arm")
+
+    def joints(self) -> FloatArray:
+        """Measured joints, shape (7,) [rad]."""
+        self._controller.require("arm")
+        return self._measured_joints()
+
+    def pose(self) -> FloatArray:
+        """Measured T_world_gripper, shape (4, 4)."""
+        return frozen(self._planner.forward(self.joints()))
+
+    def move_to_joints(
+        self, joints: FloatArray, *, speed: Speed, on_sample: ArmListener | None = None
+    ) -> Motion:
+        """Move straight in joint space.
+
+        Raises:
+            JointLimitError: a target lies outside its limits; nothing moved.
+            UnsafeMotionError: the way there touches something; nothing moved.
+        """
+        self._controller.require("arm")
+        self._check_limits(joints)
+        path = self._planner.joint_path(self._joints, np.asarray(joints))
+        return self._execute(path, speed, guarded=False, on_sample=on_sample)
+
+    def move_to_pose(
+        self,
+        T_world_gripper: FloatArray,
+        *,
+        path: Path = Path.LINEAR,
+        speed: Speed,
+        zone: float = 0.0,
+        guarded: bool = False,
+        on_sample: ArmListener | None = None,
+    ) -> Motion:
+        """Move the gripper's frame to a pose; a motion that was checked is executed as checked.
+
+        The simulated arm stops at every pose, whatever the zone.
+
+        Raises:
+            UnreachableError: no configuration reaches it; nothing moved.
+            CollisionStopError: stopped by a contact.
+        """
+        self._controller.require("arm")
+        waypoint = Waypoint("target", T_world_gripper, path)
+        joint_path = (
+            self._take_prepared(waypoint) or self._planner.plan([waypoint], self._joints)[0]
+        )
+        return self._execute(joint_path, speed, guarded=guarded, on_sample=on_sample)
+
+    def home(self, *, speed: Speed, on_sample: ArmListener | None = None) -> Motion:
+        """Move to the home configuration."""
+        return self.move_to_joints(self._planner.arm.home, speed=speed, on_sample=on_sample)
+
+    def stop(self) -> None:
+        """Stop any motion now."""
+        self._controller.stop()
+
+    def clear_error(self) -> None:
+        """Acknowledge a stop or error.
+
+        Raises:
+            EmergencyStopError: the emergency stop is still pressed.
+        """
+        self._controller.clear()
+
+    def reachable(self, T_world_gripper: FloatArray) -> BoolArray:
+        """Which gripper poses (N, 4, 4) the arm reaches within its limits, clear of the table."""
+        return self._planner.reachable(T_world_gripper)
+
+    def check(self, waypoints: Sequence[Waypoint]) -> None:
+        """Dry run from the present configuration; its paths are kept for the motions to come.
+
+        Raises:
+            UnreachableError: a waypoint, or a point of a line to it, is out of reach.
+            UnsafeMotionError: every way found touches the table or the robot itself.
+        """
+        paths = self._planner.plan(waypoints, self._joints)
+        self._prepared = list(zip(waypoints, paths, strict=True))
+
+    def link_transforms(self, joints: FloatArray) -> Mapping[str, FloatArray]:
+        """Forward kinematics: T_world_link (4, 4) of every link, and of `gripper`."""
+        return self._planner.link_transforms(joints)
+
+    def _take_prepared(self, waypoint: Waypoint) -> JointPath | None:
+        for planned, path in self._prepared:
+            same_way = planned.path is waypoint.path and np.array_equal(
+                planned.T_world_gripper, waypoint.T_world_gripper
+            )
+            if same_way and np.allclose(path.joints[0], self._joints, atol=1e-9):
+                return path
+        return None
+
+    def _check_limits(self, joints: FloatArray) -> None:
+        chain = self._planner.arm.chain
+        names = self.description.joint_names
+        for name, value, low, high in zip(names, joints, chain.lower, chain.upper, strict=True):
+            if not low - 1e-9 <= value <= high + 1e-9:
+                raise JointLimitError(
+                    f"{name} cannot go to {value:.4f} rad: limits {low:.4f} to {high:.4f}"
+                )
+
+    def _execute(
+        self, path: JointPath, speed: Speed, *, guarded: bool, on_sample: ArmListener | None
+    ) -> Motion:
+        simulation, clock = self._simulation, self._simulation.clock
+        start_ns = clock.now_ns()
+        clock.sleep(simulation.settings.latency)
+        if not simulation.carrying:
+            simulation.new_motion_error()
+        self._slip_if_scripted(path)
+        duration = self._duration(path, speed)
+        elapsed, next_sample = 0.0, 0.0
+        while elapsed < duration:
+            elapsed = min(duration, elapsed + self._tick())
+            self._go_to(path, _eased(elapsed / duration), clock_step=self._tick())
+            self._watch(path, elapsed / duration, guarded=guarded)
+            if on_sample is not None and elapsed >= next_sample:
+                on_sample(self._sample())
+                next_sample = elapsed + simulation.settings.sample_period
+        sample = self._sample()
+        return Motion(start_ns, clock.now_ns(), sample.joints, sample.T_world_gripper)
+
+    def _tick(self) -> float:
+        simulation = self._simulation
+        return CONTROL_PERIOD if simulation.dynamic else simulation.settings.sample_period
+
+    def _go_to(self, path: JointPath, share: float, *, clock_step: float) -> None:
+        columns = [np.interp(share, path.shares, column) for column in path.joints.T]
+        self._joints = np.array(columns)
+        self._simulation.joints = frozen(self._joints)
+        self._simulation.move_hand(self._planner.forward(self._joints))
+        self._simulation.clock.sleep(clock_step)
+
+    def _watch(self, path: JointPath, share: float, *, guarded: bool) -> None:
+        """Stop the motion where something stops it."""
+        simulation = self._simulation
+        if self._controller.stopping:
+            raise self._controller.fail(StoppedError("the motion was stopped"))
+        if share >= 0.5 and self._lifts(path):
+            if simulation.fault_due(FaultKind.CONNECTION_LOST):
+                raise self._controller.fail(_as_robot_error(FaultKind.CONNECTION_LOST))
+            if simulation.fault_due(FaultKind.EMERGENCY_STOP):
+                raise self._controller.fail(
+                    EmergencyStopError("the emergency stop was pressed during the lift (scripted)")
+                )
+        if guarded and share >= 0.5 and simulation.fault_due(FaultKind.COLLISION_STOP):
+            raise self._controller.fail(_as_robot_error(FaultKind.COLLISION_STOP))
+        settings = simulation.settings
+        limit = settings.guarded_force if guarded else settings.hard_force
+        force = simulation.wrist_force
+        if force > limit:
+            raise self._controller.fail(
+                CollisionStopError(f"the arm met {force:.1f} N, more than {limit:.1f} N")
+            )
+
+    def _slip_if_scripted(self, path: JointPath) -> None:
+        if self._lifts(path) and self._simulation.fault_due(FaultKind.SLIP):
+            self._simulation.make_pads_slip()
+
+    def _lifts(self, path: JointPath) -> bool:
+        rise = (
+            self._planner.forward(path.joints[-1])[2, 3]
+            - self._planner.forward(path.joints[0])[2, 3]
+        )
+        return self._simulation.carrying and bool(rise > 0.01)
+
+    def _duration(self, path: JointPath, speed: Speed) -> float:
+        T_start, T_end = (
+            self._planner.forward(path.joints[0]),
+            self._planner.forward(path.joints[-1]),
+        )
+        length = float(np.linalg.norm(T_end[:3, 3] - T_start[:3, 3]))
+        angle = rotation_angle((inverse(T_start) @ T_end)[:3, :3])
+        travels = np.abs(np.diff(path.joints, axis=0)).sum(axis=0)
+        joints = float((travels / (speed.joint * self._planner.arm.chain.max_speed)).max())
+        slowest = max(length / speed.linear, angle / speed.angular, joints)
+        return max(CONTROL_PERIOD, PEAK_OVER_MEAN * slowest)
+
+    def _measured_joints(self) -> FloatArray:
+        noise = self._simulation.noise.normal(0.0, self._simulation.settings.joint_noise, 7)
+        return frozen(self._joints + noise)
+
+    def _sample(self) -> ArmSample:
+        joints = self._measured_joints()
+        T = frozen(self._planner.forward(joints))
+        return ArmSample(self._simulation.clock.now_ns(), joints, T)
+
+
+def _eased(share: float) -> float:
+    """Cubic profile: starts and ends at rest."""
+    return share * share * (3.0 - 2.0 * share)
+
+
+def _as_robot_error(kind: FaultKind) -> RobotError:
+    error = scripted(kind)
+    assert isinstance(error, RobotError)
+    return error

@@ -1,0 +1,172 @@
+"""The simulated hand: its jaws are driven by force against simulated physics."""
+
+from __future__ import annotations
+
+from typing import Self
+
+from collection.errors import GripperNotCalibratedError, RobotTimeoutError, StoppedError
+from collection.faults import FaultKind
+from collection.robots.protocol import GripperListener, GripperMotion, GripperSample, GripperState
+from collection.robots.simulated_controller import SimulatedController
+from reach.arrays import positive
+from reach.errors import InvalidInputError
+from reach.gripper import ParallelJawGripper
+
+PERIOD = 0.02
+"""Between two looks at the jaws [s]."""
+RESTING_SPEED = 2e-4
+RESTING_LOOKS = 4
+TIMEOUT = 6.0
+WIDTH_TOLERANCE = 2e-4
+
+
+class SimulatedGripper:
+    """A simulated SmartGripper.
+
+    Args:
+        controller: shared with the arm.
+    """
+
+    def __init__(self, controller: SimulatedController) -> None:
+        self._controller = controller
+        self._simulation = controller.simulation
+        self._calibrated = True
+
+    @property
+    def name(self) -> str:
+        """Of the hand, for logs."""
+        return "simulated SmartGripper"
+
+    @property
+    def geometry(self) -> ParallelJawGripper:
+        """Pads, stroke, force and solids."""
+        return self._simulation.gripper
+
+    def connect(self) -> None:
+        """Reach the simulated hand."""
+        self._controller.connect("gripper")
+
+    def disconnect(self) -> None:
+        """Let go of the hand."""
+        self._controller.disconnect("gripper")
+
+    def __enter__(self) -> Self:
+        self.connect()
+        return self
+
+    def __exit__(self, *exception: object) -> None:
+        self.disconnect()
+
+    def state(self) -> GripperState:
+        """What the hand says of itself."""
+        return GripperState(self._controller.connected("gripper"), self._calibrated)
+
+    def calibrate(self) -> GripperMotion:
+        """Find the jaws' zero: close and open once."""
+        self._controller.require("gripper")
+        start_ns = self._simulation.clock.now_ns()
+        self._calibrated = True
+        self.close(0.5 * self.geometry.max_force)
+        done = self.open()
+        return GripperMotion(start_ns, done.end_ns, done.width, done.force)
+
+    def open(
+        self, width: float | None = None, *, on_sample: GripperListener | None = None
+    ) -> GripperMotion:
+        """Open to a width [m]; fully if None.
+
+        Raises:
+            GripperNotCalibratedError: the hand does not know where its jaws are.
+            InvalidInputError: a width outside the stroke.
+        """
+        target = self.geometry.max_opening if width is None else float(width)
+        if not 0.0 <= target <= self.geometry.max_opening:
+            raise InvalidInputError(
+                f"width {width!r} m is outside 0 to {self.geometry.max_opening} m"
+            )
+        start_ns = self._begin()
+        closing = self._simulation.opening > target + WIDTH_TOLERANCE
+        force = self.geometry.max_force
+        self._simulation.drive_jaws(force if closing else -force)
+        self._wait(lambda: self._past(target, closing=closing), on_sample)
+        self._simulation.drive_jaws(0.0)
+        return self._done(start_ns)
+
+    def close(self, force: float, *, on_sample: GripperListener | None = None) -> GripperMotion:
+        """Close with a force [N] until the jaws rest.
+
+        Raises:
+            GripperNotCalibratedError: the hand does not know where its jaws are.
+            InvalidInputError: a force outside the hand's range.
+        """
+        if positive(force, "closing force [N]") > self.geometry.max_force:
+            raise InvalidInputError(
+                f"closing force {force} N is above the hand's {self.geometry.max_force} N"
+            )
+        start_ns = self._begin()
+        self._simulation.drive_jaws(force)
+        looks = _Rest()
+        self._wait(lambda: looks.resting(self._simulation.jaw_speed), on_sample)
+        return self._done(start_ns)
+
+    def read(self) -> GripperSample:
+        """Read width and force."""
+        self._controller.require("gripper")
+        return self._sample()
+
+    def stop(self) -> None:
+        """Keep the jaws as they are: a held part stays held."""
+        self._controller.stop()
+
+    def _begin(self) -> int:
+        self._controller.require("gripper")
+        if self._simulation.fault_due(FaultKind.GRIPPER_NOT_CALIBRATED):
+            self._calibrated = False
+        if not self._calibrated:
+            raise GripperNotCalibratedError("the hand is not calibrated: call calibrate()")
+        start_ns = self._simulation.clock.now_ns()
+        self._simulation.clock.sleep(self._simulation.settings.latency)
+        return start_ns
+
+    def _wait(self, done: object, on_sample: GripperListener | None) -> None:
+        clock = self._simulation.clock
+        limit_ns = clock.now_ns() + round(TIMEOUT * 1e9)
+        while True:
+            clock.sleep(PERIOD)
+            if on_sample is not None:
+                on_sample(self._sample())
+            if self._controller.stopping:
+                raise self._controller.fail(StoppedError("the jaws were stopped"))
+            if done():  # type: ignore[operator]
+                return
+            if clock.now_ns() > limit_ns:
+                raise RobotTimeoutError(f"the jaws did not come to rest within {TIMEOUT} s")
+
+    def _past(self, target: float, *, closing: bool) -> bool:
+        opening = self._simulation.opening
+        if closing:
+            return opening <= target
+        return opening >= target - WIDTH_TOLERANCE
+
+    def _done(self, start_ns: int) -> GripperMotion:
+        sample = self._sample()
+        return GripperMotion(start_ns, sample.time_ns, sample.width, sample.force)
+
+    def _sample(self) -> GripperSample:
+        simulation, settings = self._simulation, self._simulation.settings
+        width = simulation.opening + simulation.noise.normal(0.0, settings.width_noise)
+        force = simulation.grip_force + simulation.noise.normal(0.0, settings.force_noise)
+        return GripperSample(
+            simulation.clock.now_ns(), max(0.0, float(width)), max(0.0, float(force))
+        )
+
+
+class _Rest:
+    """Counts looks at jaws that do not move."""
+
+    def __init__(self) -> None:
+        self._count = 0
+
+    def resting(self, speed: float) -> bool:
+        self._count = self._count + 1 if abs(speed) < RESTING_SPEED else 0
+        return self._count >= RESTING_LOOKS

@@ -1,0 +1,247 @@
+"""The station file: which robot, which camera, where things stand; and the station it describes."""
+
+from __future__ import annotations
+
+from contextlib import ExitStack
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Self
+
+from pydantic import BaseModel, ConfigDict, InstanceOf
+
+from collection.clock import Clock, SimulatedClock, WallClock
+from collection.drivers import (
+    CAMERA_DRIVERS,
+    ROBOT_DRIVERS,
+    BuildContext,
+    find_driver,
+)
+from collection.errors import StationFileError
+from collection.robots.motion_settings import MotionSettings
+from collection.simulation_settings import SimulationSettings
+from collection.station_file import read_sections, validated
+from reach.errors import UnknownNameError
+
+if TYPE_CHECKING:
+    from collection.cameras.protocol import ColorCamera, DepthCamera
+    from collection.robots.protocol import Arm, GripperDevice
+    from collection.simulation import Simulation, Workspace
+    from reach.gripper import ParallelJawGripper
+
+PACKAGED = Path(__file__).parent
+GRIPPERS = ("yumi",)
+
+
+class _Section(BaseModel):
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+
+class WorkspaceConfig(_Section):
+    """Where objects are placed.
+
+    Attributes:
+        center: world x, y [m].
+        size: extents along x and y [m].
+        table_height: world z of the table [m].
+    """
+
+    center: tuple[float, float] = (0.38, -0.10)
+    size: tuple[float, float] = (0.08, 0.08)
+    table_height: float = 0.0
+
+
+class GripperConfig(_Section):
+    """The hand's shape, by name."""
+
+    geometry: str = "yumi"
+
+
+class StationConfig(_Section):
+    """A validated station file.
+
+    Attributes:
+        name: of the station.
+        workspace: where objects are placed.
+        gripper: the hand's shape.
+        motion: numbers of the trial motion.
+        robot: the robot driver's own section.
+        camera: the camera driver's own section.
+        simulation: hidden draws and faults, for simulated stations only.
+    """
+
+    name: str
+    workspace: WorkspaceConfig = WorkspaceConfig()
+    gripper: GripperConfig = GripperConfig()
+    motion: MotionSettings = MotionSettings()
+    robot: InstanceOf[BaseModel]
+    camera: InstanceOf[BaseModel]
+    simulation: SimulationSettings | None = None
+
+    def gripper_geometry(self) -> ParallelJawGripper:
+        """The hand's pads, stroke and solids.
+
+        Raises:
+            UnknownNameError: no gripper of that name.
+        """
+        from reach.gripper import ParallelJawGripper
+
+        if self.gripper.geometry not in GRIPPERS:
+            raise UnknownNameError("gripper", self.gripper.geometry, GRIPPERS)
+        return ParallelJawGripper.yumi()
+
+    def workspace_area(self) -> Workspace:
+        """The workspace as the simulated cell needs it."""
+        from collection.simulation import Workspace
+
+        return Workspace(self.workspace.center, self.workspace.size, self.workspace.table_height)
+
+
+@dataclass(slots=True, eq=False)
+class Station:
+    """A station's devices, inert until connected; a context manager that connects them all.
+
+    Args:
+        config: the validated station file.
+        text: the station file as it was read, for the record.
+        arm: the arm.
+        gripper: the hand.
+        camera: finds the object.
+        color_camera: films the trial, if there is one.
+        clock: of the station.
+        simulation: the simulated cell, for simulated stations only.
+    """
+
+    config: StationConfig
+    text: str
+    arm: Arm
+    gripper: GripperDevice
+    camera: DepthCamera
+    color_camera: ColorCamera | None
+    clock: Clock
+    simulation: Simulation | None
+    _stack: ExitStack | None = None
+
+    @property
+    def simulated(self) -> bool:
+        """Whether the robot is a simulated one."""
+        return self.simulation is not None
+
+    def __enter__(self) -> Self:
+        with ExitStack() as stack:
+            devices = (self.arm, self.gripper, self.camera, self.color_camera)
+            for device in devices:
+                if device is not None:
+                    stack.enter_context(device)
+            self._stack = stack.pop_all()
+        return self
+
+    def __exit__(self, *exception: object) -> None:
+        if self._stack is not None:
+            self._stack.close()
+            self._stack = None
+
+
+def station_names() -> tuple[str, ...]:
+    """Names of the stations that come with the package."""
+    return tuple(sorted(path.stem for path in PACKAGED.glob("*.toml")))
+
+
+def find_station_file(name_or_path: str | Path) -> Path:
+    """Path of a station file.
+
+    Raises:
+        UnknownNameError: neither a packaged station nor a file.
+    """
+    path = Path(name_or_path)
+    if path.is_file():
+        return path
+    if str(name_or_path) in station_names():
+        return PACKAGED / f"{name_or_path}.toml"
+    raise UnknownNameError("station (no file, and no packaged one)", str(path), station_names())
+
+
+def example_station() -> str:
+    """A commented station file."""
+    return (PACKAGED / "simulated.toml").read_text(encoding="utf-8")
+
+
+def read_station(name_or_path: str | Path) -> StationConfig:
+    """Read and validate a station file.
+
+    Raises:
+        StationFileError: with the line, and the valid keys or values.
+        UnknownNameError: there is no such station.
+    """
+    path = find_station_file(name_or_path)
+    return parse_station(path.read_text(encoding="utf-8"), path.name)
+
+
+def parse_station(text: str, name: str) -> StationConfig:
+    """Validate a station file's text; `name` is for the error message.
+
+    Raises:
+        StationFileError: with the line, and the valid keys or values.
+    """
+    sections = read_sections(text, name)
+    data: dict[str, Any] = dict(sections.data)
+    for section, drivers in (("robot", ROBOT_DRIVERS), ("camera", CAMERA_DRIVERS)):
+        raw = data.get(section)
+        if not isinstance(raw, dict) or not isinstance(raw.get("driver"), str):
+            raise sections.error(
+                (section,),
+                f"[{section}] needs a driver; valid: {', '.join(sorted(drivers))}",
+            )
+        try:
+            driver = find_driver(section, drivers, raw["driver"])
+        except UnknownNameError as error:
+            raise sections.error((section, "driver"), str(error)) from error
+        data[section] = validated(driver.config_model(), raw, sections, (section,))
+    config = validated(StationConfig, data, sections, ())
+    assert isinstance(config, StationConfig)
+    if _simulated(config) and config.simulation is None:
+        raise StationFileError(f"{name}: a simulated device needs the section [simulation]")
+    return config
+
+
+def load_station(name_or_path: str | Path, seed: int = 0) -> Station:
+    """Build the devices of a station; nothing is connected yet.
+
+    Args:
+        name_or_path: a packaged station's name (`simulated`) or a station file.
+        seed: of everything a simulated station draws.
+
+    Raises:
+        StationFileError: with the line, and the valid keys or values.
+        UnknownNameError: there is no such station.
+    """
+    path = find_station_file(name_or_path)
+    text = path.read_text(encoding="utf-8")
+    return build_station(parse_station(text, path.name), text, path.parent, seed)
+
+
+def build_station(config: StationConfig, text: str, folder: Path, seed: int) -> Station:
+    """Build the devices of a validated station file."""
+    clock: Clock = SimulatedClock() if config.simulation is not None else WallClock()
+    context = BuildContext(config, clock, seed, folder)
+    robot = ROBOT_DRIVERS[_driver(config.robot)]
+    camera = CAMERA_DRIVERS[_driver(config.camera)]
+    arm, gripper = robot.make(config.robot, context)
+    depth_camera = camera.make(config.camera, context)
+    return Station(
+        config=config,
+        text=text,
+        arm=arm,
+        gripper=gripper,
+        camera=depth_camera,
+        color_camera=context.shared.get("color_camera"),
+        clock=clock,
+        simulation=context.shared.get("simulation"),
+    )
+
+
+def _driver(section: BaseModel) -> str:
+    return str(section.driver)  # type: ignore[attr-defined]
+
+
+def _simulated(config: StationConfig) -> bool:
+    return "simulated" in (_driver(config.robot), _driver(config.camera))

@@ -1,0 +1,120 @@
+"""Reading a station file so that a mistake is reported with its line."""
+
+from __future__ import annotations
+
+import re
+import tomllib
+from dataclasses import dataclass
+from typing import Any
+
+from pydantic import BaseModel, ValidationError
+
+from collection.errors import StationFileError
+
+_TABLE = re.compile(r"^\s*(\[\[?)\s*([\w.\-\"' ]+?)\s*\]\]?\s*(?:#.*)?$")
+_KEY = re.compile(r"^\s*([\w\-\"'.]+)\s*=")
+Place = tuple[str | int, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Sections:
+    """A parsed file, and the line each of its keys stands on."""
+
+    name: str
+    data: dict[str, Any]
+    lines: dict[Place, int]
+
+    def error(self, place: Place, message: str) -> StationFileError:
+        """An error that names the file and the line of a key, or of what holds it."""
+        at = place
+        while at and at not in self.lines:
+            at = at[:-1]
+        line = f":{self.lines[at]}" if at in self.lines else ""
+        return StationFileError(f"{self.name}{line}: {message}")
+
+
+def read_sections(text: str, name: str) -> Sections:
+    """Parse a TOML file.
+
+    Raises:
+        StationFileError: it is not TOML; the message gives the line.
+    """
+    try:
+        data = tomllib.loads(text)
+    except tomllib.TOMLDecodeError as error:
+        raise StationFileError(f"{name}: not a TOML file: {error}") from error
+    return Sections(name, data, _line_numbers(text))
+
+
+def validated(
+    model: type[BaseModel], data: dict[str, Any], sections: Sections, place: Place
+) -> BaseModel:
+    """Validate one section.
+
+    Raises:
+        StationFileError: with the line, and the valid keys of the section.
+    """
+    try:
+        return model.model_validate(data)
+    except ValidationError as error:
+        first, *others = error.errors()
+        where: Place = (*place, *first["loc"])
+        message = _message(model, dict(first), where, place)
+        more = f" (and {len(others)} more)" if others else ""
+        raise sections.error(where, message + more) from error
+
+
+def _message(model: type[BaseModel], error: dict[str, Any], where: Place, place: Place) -> str:
+    name = ".".join(str(part) for part in where)
+    holder = _model_at(model, where[len(place) : -1])
+    keys = ", ".join(sorted(holder.model_fields)) if holder else ""
+    if error["type"] == "extra_forbidden":
+        return f"unknown key {name!r}; valid keys: {keys}"
+    if error["type"] == "missing":
+        return f"missing key {name!r}; valid keys: {keys}"
+    return f"{name}: {error['msg']}, got {error['input']!r}"
+
+
+def _model_at(model: type[BaseModel], path: Place) -> type[BaseModel] | None:
+    """The model of a nested section."""
+    current: Any = model
+    for part in path:
+        if isinstance(part, int):
+            continue
+        field = current.model_fields.get(part)
+        current = _model_in(field.annotation) if field else None
+        if current is None:
+            return None
+    return current if isinstance(current, type) and issubclass(current, BaseModel) else None
+
+
+def _model_in(annotation: Any) -> type[BaseModel] | None:
+    """The pydantic model inside `X`, `X | None` or `tuple[X, ...]`."""
+    if isinstance(annotation, type) and issubclass(annotation, BaseModel):
+        return annotation
+    for part in getattr(annotation, "__args__", ()):
+        found = _model_in(part)
+        if found is not None:
+            return found
+    return None
+
+
+def _line_numbers(text: str) -> dict[Place, int]:
+    lines: dict[Place, int] = {}
+    table: Place = ()
+    counts: dict[str, int] = {}
+    for number, line in enumerate(text.splitlines(), start=1):
+        header, key = _TABLE.match(line), _KEY.match(line)
+        if header:
+            name = header.group(2)
+            table = tuple(part.strip(" \"'") for part in name.split("."))
+            if header.group(1) == "[[":
+                index = counts.get(name, 0)
+                counts[name] = index + 1
+                lines.setdefault(table, number)
+                table = (*table, index)
+            lines.setdefault(table, number)
+        elif key:
+            parts = tuple(part.strip("\"'") for part in key.group(1).split("."))
+            lines.setdefault((*table, *parts), number)
+    return lines
