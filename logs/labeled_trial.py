@@ -91,7 +91,7 @@ class LabeledTrial:
     Args:
         trial_id: unique.
         session: identity of its session or source.
-        number: place in the executed order, from 1.
+        number: place in the planned order.
         object_name: key of the data set's objects.
         grasp_id: of the planned grasp; its repeats share it.
         attempt: index of the grasp among the object's, from 0.
@@ -107,6 +107,7 @@ class LabeledTrial:
         scores: model -> score as recorded.
         takes: how often it was executed or begun; 1 without redo or void.
         redos: why takes were redone, in order.
+        redo_outcomes: what the sensors said of each redone take: lifted, not lifted or unknown.
         voids: why takes were void, in order.
         record: path of its record, relative to the session; None if there is none.
         record_sha256: of that file.
@@ -132,6 +133,7 @@ class LabeledTrial:
     scores: Mapping[str, StoredScore] = field(default_factory=dict)
     takes: int = 1
     redos: tuple[str, ...] = ()
+    redo_outcomes: tuple[str, ...] = ()
     voids: tuple[str, ...] = ()
     record: str | None = None
     record_sha256: str | None = None

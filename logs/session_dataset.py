@@ -114,6 +114,7 @@ def _labeled_trial(
     planned, described = trial.planned, facts.descriptor
     take = trial.valid_take
     assert take is not None
+    redone = [take for take in trial.takes if take.status == "redone"]
     return LabeledTrial(
         trial_id=trial.trial_id,
         session=session,
@@ -132,12 +133,18 @@ def _labeled_trial(
         execution=_execution(take, facts),
         scores={model: _score(event) for model, event in sorted(take.scores.items())},
         takes=len(trial.takes),
-        redos=tuple(t.ended_because for t in trial.takes if t.status == "redone"),
+        redos=tuple(t.ended_because for t in redone),
+        redo_outcomes=tuple(_sensed(t) for t in redone),
         voids=tuple(t.ended_because for t in trial.takes if t.status in ("voided", "interrupted")),
         record=take.record,
         record_sha256=facts.sha256,
         simulated=described.simulated,
     )
+
+
+def _sensed(take: TakeState) -> str:
+    lifted = take.sensor.lifted if take.sensor else None
+    return {True: "lifted", False: "not lifted", None: "unknown"}[lifted]
 
 
 def _chosen_label(take: TakeState, unblinded: bool) -> LabelEvent:

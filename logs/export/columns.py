@@ -48,7 +48,7 @@ def _flat(matrix: FloatArray | None) -> list[float] | None:
 BASE_COLUMNS: tuple[Column, ...] = (
     Column("trial_id", "text", "unique id of the trial", lambda t: t.trial_id),
     Column("session", "text", "session or source the trial is from", lambda t: t.session),
-    Column("number", "integer", "place in the executed order, from 1", lambda t: t.number),
+    Column("number", "integer", "place in the planned order", lambda t: t.number),
     Column("simulated", "truth", "true: no real robot moved", lambda t: t.simulated),
     Column("object", "text", "name of the object; its mesh is in meshes/", lambda t: t.object_name),
     Column("grasp_id", "text", "planned grasp; its repeats share it", lambda t: t.grasp_id),
@@ -78,6 +78,12 @@ BASE_COLUMNS: tuple[Column, ...] = (
     Column("relabeled", "integer", "earlier labels it replaces", lambda t: t.label.relabeled),
     Column("takes", "integer", "takes begun for this trial", lambda t: t.takes),
     Column("redo_causes", "texts", "why earlier takes were redone", lambda t: list(t.redos)),
+    Column(
+        "redo_outcomes",
+        "texts",
+        "what the sensors said of each redone take: lifted, not lifted or unknown",
+        lambda t: list(t.redo_outcomes),
+    ),
     Column("void_causes", "texts", "why earlier takes were void", lambda t: list(t.voids)),
     Column(
         "T_world_object_planned",
@@ -258,6 +264,7 @@ def trial_of_row(row: dict[str, Any], models: Iterable[str]) -> LabeledTrial:
         scores={m: _score(row, m) for m in models if row[f"score_{m}"] is not None},
         takes=row["takes"],
         redos=tuple(row["redo_causes"]),
+        redo_outcomes=tuple(row["redo_outcomes"]),
         voids=tuple(row["void_causes"]),
         record=row["record"],
         record_sha256=row["record_sha256"],

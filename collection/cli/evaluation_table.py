@@ -1,0 +1,123 @@
+"""The comparison as it is printed: one line a model, references apart."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from rich.table import Table
+
+HEADERS = ("model", "AP", "AR", "F1", "MAE", "Brier", "s/grasp", "AP over overlap")
+
+
+def evaluation_table(content: Mapping[str, Any]) -> list[Table]:
+    """The tables of an evaluation's JSON content."""
+    from rich.table import Table
+
+    marked = " - simulated labels" if content["simulated"] else ""
+    title = (
+        f"{content['trials']} trials of {content['grasps']} grasps on "
+        f"{len(content['objects'])} objects{marked}"
+    )
+    table = Table(title=title, title_justify="left", caption=_caption(content))
+    for header in HEADERS:
+        table.add_column(header, justify="left" if header == "model" else "right")
+    references = set(content["references"])
+    for name, row in content["models"].items():
+        style = "dim" if name in references else None
+        table.add_row(*_cells(name, row), style=style)
+    tables = [table]
+    if "cross_validation" in content:
+        tables.append(_cross_validation_table(content["cross_validation"]))
+    return tables
+
+
+def print_table(tables: list[Table]) -> None:
+    """Print tables on standard output."""
+    from rich.console import Console
+
+    console = Console(width=None)
+    for table in tables:
+        console.print(table)
+
+
+def _cells(name: str, row: Mapping[str, Any]) -> list[str]:
+    interval = row["intervals"]["ap"]
+    above = row["above_overlap"].get("ap")
+    spread = f" [{interval[0]:.2f}, {interval[1]:.2f}]" if interval else ""
+    return [
+        name,
+        _number(row["ap"]) + spread,
+        *(_number(row[key]) for key in ("ar", "f1", "mae", "brier")),
+        f"{row['seconds_per_grasp']:.2g}",
+        f"[{above[0]:+.2f}, {above[1]:+.2f}]" if above else "",
+    ]
+
+
+def _number(value: float | None) -> str:
+    return "-" if value is None else f"{value:.3f}"
+
+
+def _caption(content: Mapping[str, Any]) -> str:
+    error = content["pose_error"]
+    text = (
+        f"Means over objects, 95 % bootstrap intervals. Pose error {error['translation'] * 1e3:.2f} "
+        f"mm, {error['rotation']:.4f} rad ({error['basis']})."
+    )
+    without = content["objects_without_positive"]
+    if without:
+        text += f" Left out of AP and AR, no trial lifted: {', '.join(without)}."
+    if "dynamic" in content["models"] and content["simulated"]:
+        text += " dynamic: same engine as the labels: a ceiling, not a rival."
+    return text
+
+
+def _cross_validation_table(content: Mapping[str, Any]) -> Table:
+    from rich.table import Table
+
+    table = Table(
+        title=f"Leave one object out, {content['draws']} parameter draws", title_justify="left"
+    )
+    for header in ("model", "depth", "AP", "AR", "F1", "MAE", "Brier"):
+        table.add_column(header, justify="left" if header in ("model", "depth") else "right")
+    depth = {True: "saturated", False: "unsaturated", None: ""}
+    for name, variants in content["models"].items():
+        for row in variants:
+            numbers = (_number(row[key]) for key in ("ap", "ar", "f1", "mae", "brier"))
+            table.add_row(name, depth[row["saturated"]], *numbers)
+    if content["exempt"]:
+        table.caption = f"Parameters not drawn: {', '.join(content['exempt'])}."
+    return table
+
+
+@contextmanager
+def progress_bars() -> Iterator[Callable[[str, int, int], None]]:
+    """One progress bar a model, on standard error."""
+    from rich.console import Console
+    from rich.progress import (
+        BarColumn,
+        MofNCompleteColumn,
+        Progress,
+        TaskID,
+        TextColumn,
+        TimeRemainingColumn,
+    )
+
+    columns = (
+        TextColumn("{task.description:>16}"),
+        BarColumn(),
+        MofNCompleteColumn(),
+        TimeRemainingColumn(),
+    )
+    with Progress(*columns, console=Console(stderr=True), transient=True) as bars:
+        tasks: dict[tuple[str, int], TaskID] = {}
+
+        def report(name: str, done: int, total: int) -> None:
+            key = (name, total)
+            if key not in tasks:
+                tasks[key] = bars.add_task(name, total=total)
+            bars.update(tasks[key], completed=done)
+
+        yield report
