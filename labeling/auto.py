@@ -73,9 +73,10 @@ class AutoOperator:
 
     def _next_command(self, state: SessionState) -> Command | None:
         trial = state.current_trial
-        if trial is None or not trial.takes or state.stopped or state.paused or state.holds:
+        take = trial.active_take if trial else None
+        if trial is None or take is None or state.stopped or state.paused or state.holds:
             return None
-        asked = self._answer(trial, trial.takes[-1])
+        asked = self._answer(trial, take)
         if asked is None:
             return None
         kind, value = asked

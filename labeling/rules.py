@@ -136,7 +136,7 @@ def _replace_object(
 def _label(
     state: SessionState, trial: TrialState, value: Value, who: Fields, blind: bool
 ) -> AnyEvent:
-    take = trial.takes[-1] if trial.takes else None
+    take = trial.active_take
     awaiting = (
         state.current == trial.trial_id
         and take is not None
@@ -183,15 +183,17 @@ def _undo(state: SessionState, trial: TrialState, value: Value, who: Fields, _: 
 
 def _redo(state: SessionState, trial: TrialState, value: Value, who: Fields, _: bool) -> AnyEvent:
     _not_moving(trial)
-    running = trial.takes[-1] if trial.takes and trial.takes[-1].status == "running" else None
-    take = running or _executed_take(trial)
+    take = trial.active_take
+    if take is None or take.status != "running":
+        take = _executed_take(trial)
     return _make(ev.Redone, who, take=take.take, **value.model_dump())
 
 
 def _void(state: SessionState, trial: TrialState, value: Value, who: Fields, _: bool) -> AnyEvent:
     _not_moving(trial)
-    running = trial.takes[-1] if trial.takes and trial.takes[-1].status == "running" else None
-    take = running or _executed_take(trial)
+    take = trial.active_take
+    if take is None or take.status != "running":
+        take = _executed_take(trial)
     return _make(ev.Voided, who, take=take.take, **value.model_dump())
 
 

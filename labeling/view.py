@@ -68,7 +68,8 @@ def overall_state(state: SessionState, *, closed: bool = False) -> str:
     if state.stopped:
         return "STOPPED"
     trial = state.current_trial
-    phase = trial.takes[-1].phase if trial and trial.takes else None
+    take = trial.active_take if trial else None
+    phase = take.phase if take else None
     if phase is Phase.AWAITING_LABEL and trial is not None and trial.status == "unlabelled":
         return phase.value  # a label is welcome in a pause as well
     if state.holds:
@@ -127,9 +128,9 @@ def label_view(take: TakeState) -> View | None:
 
 def _current(console: Console, state: SessionState) -> View | None:
     trial = state.current_trial
-    if console.mode == "review" or trial is None or not trial.takes:
+    take = trial.active_take if trial else None
+    if console.mode == "review" or trial is None or take is None:
         return None
-    take = trial.takes[-1]
     return {
         **trial_view(trial, take),
         "of": len(state.trials),

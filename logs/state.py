@@ -100,6 +100,13 @@ class TrialState:
         return next((take for take in reversed(self.takes) if take.status == "executed"), None)
 
     @property
+    def active_take(self) -> TakeState | None:
+        """The take a console is about: the running one, else the one that counts."""
+        if self.takes and self.takes[-1].status == "running":
+            return self.takes[-1]
+        return self.valid_take or (self.takes[-1] if self.takes else None)
+
+    @property
     def label(self) -> LabelEvent | None:
         """The verdict that counts."""
         take = self.valid_take

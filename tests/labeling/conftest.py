@@ -1,18 +1,25 @@
-"""A session folder with a small plan, and a controller on it."""
+"""A session folder with a small plan, a controller on it, and its loop in a thread."""
 
 from __future__ import annotations
 
+import importlib.util
+import threading
 from collections.abc import Callable, Iterator
 from pathlib import Path
+from types import ModuleType
+from typing import Any
 
 import pytest
 
+from labeling.commands import Actor, Answer, Command, CommandKind
 from labeling.controller import SessionController
-from logs.events import Source
+from labeling.take import Take
+from logs.events import Phase, SensorVerdict, Source
 from logs.session import SessionDescriptor, SessionFolder, open_segment
-from logs.state import PlannedEntry
+from logs.state import PlannedEntry, SessionState, TrialState
 
 SETUP = {"robot": "r1", "camera": "c1", "calibration": "k1", "plan": "p1"}
+ANN = Actor("ann", Source.OPERATOR)
 
 
 def describe(trials: int) -> SessionDescriptor:
@@ -35,33 +42,117 @@ def describe(trials: int) -> SessionDescriptor:
     )
 
 
+class Bench:
+    """A controller with the loop's steps and an operator's commands at hand, in one thread."""
+
+    def __init__(self, folder: SessionFolder, **options: Any) -> None:
+        self.folder = folder
+        journal = folder.open_journal()
+        self.state = SessionState.fold(folder.descriptor.trials, journal.entries)
+        open_segment(journal, self.state, SETUP, operator="ann", source=Source.OPERATOR)
+        self.controller = SessionController(journal, self.state, **options)
+
+    def trial(self, number: int) -> TrialState:
+        return self.state.order[number - 1]
+
+    def command(self, kind: str, number: int | None = None, **value: Any) -> Command:
+        trial = self.trial(number) if number else None
+        return Command(
+            kind=CommandKind(kind),
+            trial_id=trial.trial_id if trial else None,
+            rev=trial.rev if trial else self.state.control_rev,
+            value=value,
+        )
+
+    def do(self, kind: str, number: int | None = None, *, by: Actor = ANN, **value: Any) -> Answer:
+        return self.controller.submit(self.command(kind, number, **value), by)
+
+    def begin(self) -> Take:
+        work = self.controller.next_work()
+        assert work is not None
+        return self.controller.begin(work)
+
+    def execute(self, take: Take) -> Take:
+        number = next(t.planned.number for t in self.state.order if t.trial_id == take.trial_id)
+        assert self.do("placed", number).status == "stored"
+        take.wait_placed()
+        for phase in (Phase.CAPTURE, Phase.REGISTER, Phase.EXECUTE):
+            take.advance(phase, {"registration": {"margin": 0.1 * number}})
+        take.record_executed(f"trials/{number}/trial.mcap", SensorVerdict(lifted=True))
+        return take
+
+    def executed(self) -> Take:
+        """A new take, executed and waiting for its label."""
+        return self.execute(self.begin())
+
+    def labelled(self, outcome: str = "success", **value: Any) -> Take:
+        take = self.executed()
+        number = next(t.planned.number for t in self.state.order if t.trial_id == take.trial_id)
+        assert self.do("label", number, outcome=outcome, **value).status == "stored"
+        return take
+
+
 @pytest.fixture
 def folder(tmp_path: Path) -> SessionFolder:
     return SessionFolder.create(tmp_path / "session", describe(3))
 
 
-def open_controller(folder: SessionFolder, **options: object) -> SessionController:
-    journal = folder.open_journal()
-    from logs.state import SessionState
-
-    state = SessionState.fold(folder.descriptor.trials, journal.entries)
-    open_segment(journal, state, SETUP, operator="ann", source=Source.OPERATOR)
-    return SessionController(journal, state, **options)  # type: ignore[arg-type]
-
-
 @pytest.fixture
-def opened(folder: SessionFolder) -> Iterator[Callable[..., SessionController]]:
-    made: list[SessionController] = []
+def make_bench(folder: SessionFolder) -> Iterator[Callable[..., Bench]]:
+    made: list[Bench] = []
 
-    def make(**options: object) -> SessionController:
-        made.append(open_controller(folder, **options))
+    def make(**options: Any) -> Bench:
+        made.append(Bench(folder, **options))
         return made[-1]
 
     yield make
-    for controller in made:
-        controller.close("ended")
+    for bench in made:
+        bench.controller.close("ended")
 
 
 @pytest.fixture
-def controller(opened: Callable[..., SessionController]) -> SessionController:
-    return opened()
+def bench(make_bench: Callable[..., Bench]) -> Bench:
+    return make_bench()
+
+
+@pytest.fixture
+def fake_session() -> ModuleType:
+    """The module fake_session.py beside this file."""
+    path = Path(__file__).with_name("fake_session.py")
+    spec = importlib.util.spec_from_file_location("fake_session", path)
+    assert spec is not None and spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+@pytest.fixture
+def in_thread() -> Iterator[Callable[[Callable[[], Any]], Callable[[], Any]]]:
+    """Run a blocking call in a thread; the returned function waits for its result."""
+    threads: list[threading.Thread] = []
+
+    def start(call: Callable[[], Any]) -> Callable[[], Any]:
+        result: list[Any] = []
+
+        def run() -> None:
+            try:
+                result.append(call())
+            except Exception as error:
+                result.append(error)
+
+        thread = threading.Thread(target=run, daemon=True)
+        thread.start()
+        threads.append(thread)
+
+        def join() -> Any:
+            thread.join(10)
+            assert not thread.is_alive(), "the call still waits"
+            if isinstance(result[0], Exception):
+                raise result[0]
+            return result[0]
+
+        return join
+
+    yield start
+    for thread in threads:
+        thread.join(10)
