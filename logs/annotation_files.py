@@ -104,6 +104,7 @@ def encode_label(label: LabelRecord) -> v1.Label:
         note=label.note,
         operator=label.operator,
         withdraws=label.withdraws,
+        second=label.second,
         details=dict(label.details),
     )
 
@@ -153,6 +154,7 @@ def _decode_label(data: bytes) -> LabelRecord:
         note=message.note,
         operator=message.operator,
         withdraws=message.withdraws,
+        second=message.second,
         details=dict(message.details),
     )
 

@@ -14,6 +14,9 @@ from pathlib import Path
 from reach.arrays import FloatArray, frozen
 from reach.errors import InvalidInputError
 
+ALL_LABELS = "all"
+"""Withdraws every label so far: recovery could not vouch for them."""
+
 
 @dataclass(frozen=True, slots=True)
 class LabelRecord:
@@ -29,7 +32,8 @@ class LabelRecord:
         reason: of a failure.
         note: the operator's words.
         operator: who.
-        withdraws: event id of a label that holds no longer (an undo).
+        withdraws: event id of a label that holds no longer (an undo), or ALL_LABELS.
+        second: a second operator's verdict, for agreement; it never counts as the label.
         details: whatever else the event says.
     """
 
@@ -43,6 +47,7 @@ class LabelRecord:
     note: str = ""
     operator: str = ""
     withdraws: str = ""
+    second: bool = False
     details: Mapping[str, str] = field(default_factory=dict)
 
 
@@ -143,11 +148,16 @@ class Annotations:
     @property
     def label(self) -> LabelRecord | None:
         """The verdict that counts: the newest that was not withdrawn."""
-        gone = {label.withdraws for label in self.labels if label.withdraws}
-        held = [
-            label for label in self.labels if not label.withdraws and label.event_id not in gone
-        ]
-        return max(held, key=lambda label: label.revision, default=None)
+        ordered = sorted(self.labels, key=lambda label: label.revision)
+        held: list[LabelRecord] = []
+        for label in ordered:
+            if label.withdraws == ALL_LABELS:
+                held.clear()
+            elif label.withdraws:
+                held = [one for one in held if one.event_id != label.withdraws]
+            elif not label.second:
+                held.append(label)
+        return held[-1] if held else None
 
     @property
     def newest_scores(self) -> dict[str, ScoreRecord]:

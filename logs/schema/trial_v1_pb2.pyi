@@ -666,6 +666,7 @@ class Label(_message.Message):
     WITHDRAWS_FIELD_NUMBER: _builtins.int
     DETAILS_FIELD_NUMBER: _builtins.int
     TAKE_FIELD_NUMBER: _builtins.int
+    SECOND_FIELD_NUMBER: _builtins.int
     trial_id: _builtins.str
     event_id: _builtins.str
     """of the journal's event"""
@@ -677,6 +678,8 @@ class Label(_message.Message):
     withdraws: _builtins.str
     """an undo: the event id of the label that holds no longer"""
     take: _builtins.int
+    second: _builtins.bool
+    """a second operator's verdict: never the label"""
     @_builtins.property
     def timestamp(self) -> _timestamp_pb2.Timestamp: ...
     @_builtins.property
@@ -695,10 +698,11 @@ class Label(_message.Message):
         withdraws: _builtins.str = ...,
         details: _abc.Mapping[_builtins.str, _builtins.str] | None = ...,
         take: _builtins.int = ...,
+        second: _builtins.bool = ...,
     ) -> None: ...
     _HasFieldArgType: _TypeAlias = _typing.Literal["timestamp", b"timestamp"]  # noqa: Y015
     def HasField(self, field_name: _HasFieldArgType) -> _builtins.bool: ...
-    _ClearFieldArgType: _TypeAlias = _typing.Literal["details", b"details", "event_id", b"event_id", "note", b"note", "operator", b"operator", "outcome", b"outcome", "reason", b"reason", "revision", b"revision", "take", b"take", "timestamp", b"timestamp", "trial_id", b"trial_id", "withdraws", b"withdraws"]  # noqa: Y015
+    _ClearFieldArgType: _TypeAlias = _typing.Literal["details", b"details", "event_id", b"event_id", "note", b"note", "operator", b"operator", "outcome", b"outcome", "reason", b"reason", "revision", b"revision", "second", b"second", "take", b"take", "timestamp", b"timestamp", "trial_id", b"trial_id", "withdraws", b"withdraws"]  # noqa: Y015
     def ClearField(self, field_name: _ClearFieldArgType) -> None: ...
     def WhichOneof(self, oneof_group: _Never) -> None: ...
 

@@ -1,0 +1,34 @@
+"""`reach recover`: repair a session after a crash."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import asdict
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+
+def recover(
+    session: Annotated[Path, typer.Argument(help="The session's folder.")],
+    as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object.")] = False,
+) -> None:
+    """Save unfinished records and bring journal, records and index together.
+
+    Nothing is deleted: originals stay beside what was saved. Sessions do this by themselves
+    when they start; it is harmless on a healthy session.
+
+    - `reach recover sessions/monday`
+    """
+    from logs.recovery import recover_session
+
+    report = recover_session(session)
+    if as_json:
+        findings = [asdict(finding) for finding in report.findings]
+        print(json.dumps({"takes": report.takes, "findings": findings}))
+        return
+    for finding in report.findings:
+        print(f"{finding.severity.value.upper():>7}  {finding.place}: {finding.text}")
+    told = f"{len(report.findings)} findings" if report.findings else "nothing to repair"
+    print(f"{report.takes} takes checked, {told}")
