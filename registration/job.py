@@ -1,0 +1,93 @@
+"""One registration under way: the divided image, and searches over its candidates."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+
+import numpy as np
+
+from reach.objects import GraspObject
+from reach.stable_poses import StablePose, stable_poses
+from registration.frame import DepthFrame
+from registration.mesh_model import mesh_model
+from registration.observation import scan
+from registration.options import RegistrationOptions
+from registration.search import Hypothesis, Search
+from registration.table import fit_table
+
+
+class Job:
+    """The image divided into table and candidates, ready to be searched.
+
+    Args:
+        obj: the part.
+        frame: the depth image.
+        options: thresholds and choices.
+        seed: of the random draws.
+
+    Raises:
+        NoTableError: no level plane in the image.
+        TooFewPointsError: nothing large enough stands on the table.
+    """
+
+    def __init__(
+        self, obj: GraspObject, frame: DepthFrame, options: RegistrationOptions, seed: int
+    ) -> None:
+        self.obj, self.frame, self.options, self.seed = obj, frame, options, seed
+        self.timings: dict[str, float] = {}
+        self.profile = options.profile_for(frame)
+        with self.timed("prepare"):
+            self.model = mesh_model(obj)
+            self.poses: tuple[StablePose, ...] = stable_poses(obj)
+        with self.timed("table"):
+            self.table = fit_table(
+                frame,
+                np.random.default_rng(seed),
+                noise_bounds=self.profile.noise_bounds,
+                max_tilt=options.max_table_tilt,
+            )
+        with self.timed("segment"):
+            self.scan = scan(
+                frame, self.table, model=self.model, profile=self.profile, options=options
+            )
+            self.groups = self._searches(self.scan.groups())
+
+    @contextmanager
+    def timed(self, stage: str) -> Iterator[None]:
+        """Add the CPU time of a block to a stage."""
+        start = time.process_time()
+        try:
+            yield
+        finally:
+            self.timings[stage] = self.timings.get(stage, 0.0) + time.process_time() - start
+
+    def on_table(self, poses: Sequence[StablePose], stage: str) -> list[Hypothesis]:
+        """Search stable poses over all groups of components, by rising cost."""
+        return self._run(self.groups, lambda search: search.on_table(poses), stage)
+
+    def single_components(self, stage: str) -> list[Hypothesis]:
+        """Search all stable poses over components one by one: two parts may stand together."""
+        singles = self._searches(self.scan.singles())
+        return self._run(singles, lambda search: search.on_table(self.poses), stage)
+
+    def anywhere(self, stage: str) -> list[Hypothesis]:
+        """Search all orientations over all groups of components, by rising cost."""
+        return self._run(self.groups, lambda search: search.anywhere(), stage)
+
+    def _run(
+        self,
+        searches: Sequence[Search],
+        how: Callable[[Search], list[Hypothesis]],
+        stage: str,
+    ) -> list[Hypothesis]:
+        with self.timed(stage):
+            found = [hypothesis for search in searches for hypothesis in how(search)]
+        return sorted(found, key=lambda hypothesis: hypothesis.cost)
+
+    def _searches(self, groups: Sequence[tuple[int, ...]]) -> list[Search]:
+        return [
+            Search(self.model, self.scan.observation(group), self.profile, self.table.noise)
+            for group in groups
+        ]
