@@ -139,14 +139,13 @@ def _cross_validation(
     jobs: int,
     progress: Any,
 ) -> dict[str, Any]:
-    from reach.models.registry import make_scorer
-
     from reach.evaluation.cross_validation import (
         cross_validate,
         draw_parameters,
         drawable,
         variants,
     )
+    from reach.models.registry import make_scorer
 
     parameters = draw_parameters(seed, draws)
     table: dict[str, Any] = {"draws": draws, "seed": seed, "models": {}, "exempt": []}

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from rich.table import Table
 
-HEADERS = ("model", "AP", "AR", "F1", "MAE", "Brier", "s/grasp", "AP over overlap")
+HEADERS = ("model", "AP", "95 %", "AR", "F1", "MAE", "Brier", "s/grasp")
 
 
 def evaluation_table(content: Mapping[str, Any]) -> list[Table]:
@@ -23,7 +23,7 @@ def evaluation_table(content: Mapping[str, Any]) -> list[Table]:
     )
     table = Table(title=title, title_justify="left", caption=_caption(content))
     for header in HEADERS:
-        table.add_column(header, justify="left" if header == "model" else "right")
+        table.add_column(header, justify="left" if header == "model" else "right", no_wrap=True)
     references = set(content["references"])
     for name, row in content["models"].items():
         style = "dim" if name in references else None
@@ -45,14 +45,12 @@ def print_table(tables: list[Table]) -> None:
 
 def _cells(name: str, row: Mapping[str, Any]) -> list[str]:
     interval = row["intervals"]["ap"]
-    above = row["above_overlap"].get("ap")
-    spread = f" [{interval[0]:.2f}, {interval[1]:.2f}]" if interval else ""
     return [
         name,
-        _number(row["ap"]) + spread,
+        _number(row["ap"]),
+        f"{interval[0]:.2f}-{interval[1]:.2f}" if interval else "",
         *(_number(row[key]) for key in ("ar", "f1", "mae", "brier")),
         f"{row['seconds_per_grasp']:.2g}",
-        f"[{above[0]:+.2f}, {above[1]:+.2f}]" if above else "",
     ]
 
 

@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import TYPE_CHECKING
 
 from reach.evaluation.cases import GraspCase
-from reach.evaluation.references import reference_rows
+from reach.evaluation.references import OverlapScorer, constant_row, oracle_row
 from reach.evaluation.scoring import Scorer, score_cases
 from reach.evaluation.table import Evaluation, tabulate
 
@@ -44,8 +44,8 @@ def compare(
     def report(name: str) -> Callable[[int, int], None] | None:
         return None if progress is None else lambda done, total: progress(name, done, total)
 
-    scored = [
-        score_cases(
+    rows = {
+        scorer.name: score_cases(
             cases,
             scorer,
             pose_error=pose_error,
@@ -55,9 +55,10 @@ def compare(
             progress=report(scorer.name),
             use_cache=use_cache,
         )
-        for scorer in scorers
-    ]
-    scored += reference_rows(cases, pose_error=pose_error, seed=seed, progress=report("overlap"))
+        for scorer in (*scorers, OverlapScorer())
+    }
+    overlap = rows.pop("overlap")
+    scored = [*rows.values(), constant_row(cases), overlap, oracle_row(cases)]
     return tabulate(cases, scored, seed=seed)
 
 

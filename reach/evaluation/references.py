@@ -6,16 +6,17 @@ for its physics, and none can beat `oracle`, which knows each grasp's success ra
 
 from __future__ import annotations
 
-import time
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from reach.arrays import FloatArray
 from reach.evaluation.cases import GraspCase
 from reach.evaluation.overlap import overlap_score
-from reach.evaluation.scored import ScoredModel
+from reach.evaluation.scored import Parameter, ScoredModel
+from reach.grasp import Grasp
+from reach.scene import Scene
 
 if TYPE_CHECKING:
     from reach.pose_error import PoseError
@@ -23,37 +24,51 @@ if TYPE_CHECKING:
 REFERENCE_NAMES = ("constant", "overlap", "oracle")
 
 
-def reference_rows(
-    cases: Sequence[GraspCase],
-    *,
-    pose_error: PoseError | None,
-    samples: int = 30,
-    seed: int = 0,
-    progress: Callable[[int, int], None] | None = None,
-) -> list[ScoredModel]:
-    """Score all cases by the constant 1, the pads' overlap with the object, and the true rate.
+@dataclass(frozen=True, slots=True)
+class ReferenceScore:
+    """A score and nothing behind it."""
+
+    value: float
+
+
+@dataclass(frozen=True, slots=True)
+class OverlapScorer:
+    """Scores by the share of the pads that touches the object, over perturbed poses.
 
     Args:
-        cases: N labeled grasps.
-        pose_error: what the overlap is averaged under; the planned pose alone if None.
-        samples: number of perturbed poses the overlap is averaged over.
-        seed: of the perturbations.
-        progress: called with the number of grasps whose overlap is known, and their total.
+        samples: number of perturbed poses.
     """
-    count = len(cases)
-    overlap = np.empty(count)
-    start = time.perf_counter()
-    for i, case in enumerate(cases):
-        overlap[i] = overlap_score(
-            case.scene, case.grasp, pose_error=pose_error, samples=samples, seed=seed
-        )
-        if progress:
-            progress(i + 1, count)
-    seconds = (time.perf_counter() - start) / count
-    rates: FloatArray = np.array([case.rate for case in cases])
-    parameters: dict[str, float | bool | str] = {"samples": samples if pose_error else 1}
-    return [
-        ScoredModel("constant", "1", {"value": 1.0}, np.ones(count), 0.0),
-        ScoredModel("overlap", "1", parameters, overlap, seconds),
-        ScoredModel("oracle", "1", {}, rates, 0.0),
-    ]
+
+    samples: int = 30
+
+    @property
+    def name(self) -> str:
+        """`overlap`."""
+        return "overlap"
+
+    @property
+    def version(self) -> str:
+        """Of the scores."""
+        return "1"
+
+    @property
+    def parameters(self) -> dict[str, Parameter]:
+        """What the scores depend on."""
+        return {"samples": float(self.samples)}
+
+    def score(
+        self, scene: Scene, grasp: Grasp, *, pose_error: PoseError | None = None, seed: int = 0
+    ) -> ReferenceScore:
+        """Score one grasp."""
+        value = overlap_score(scene, grasp, pose_error=pose_error, samples=self.samples, seed=seed)
+        return ReferenceScore(value)
+
+
+def constant_row(cases: Sequence[GraspCase]) -> ScoredModel:
+    """Every grasp will succeed."""
+    return ScoredModel("constant", "1", {"value": 1.0}, np.ones(len(cases)), 0.0)
+
+
+def oracle_row(cases: Sequence[GraspCase]) -> ScoredModel:
+    """Every grasp scored with the success rate of its own trials."""
+    return ScoredModel("oracle", "1", {}, np.array([case.rate for case in cases]), 0.0)
