@@ -160,5 +160,5 @@ def _ordered_trials(
             object_name=grasp.object_name,
             repeat=repeat,
         )
-        for number, (_, grasp, repeat) in enumerate(placed)
+        for number, (_, grasp, repeat) in enumerate(placed, start=1)
     )

@@ -71,7 +71,7 @@ class PlannedGrasp(_Record):
 
 
 class PlannedTrial(_Record):
-    """One attempt of one grasp; `number` is its place in the session, from 0."""
+    """One attempt of one grasp; `number` is its place in the session, from 1."""
 
     number: int
     trial_id: str

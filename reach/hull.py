@@ -11,6 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from reach.arrays import FloatArray, IntArray
+from reach.errors import InvalidMeshError
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -104,11 +105,17 @@ class Hull:
 
 
 def convex_hull(vertices: FloatArray, center: FloatArray) -> Hull:
-    """Convex hull of vertices (V, 3) [m] about a center (3,) inside it."""
+    """Convex hull of vertices (V, 3) [m] about a center (3,) inside it.
+
+    Raises:
+        InvalidMeshError: the center lies outside the hull.
+    """
     from scipy.spatial import ConvexHull
 
     points = vertices - center
     hull = ConvexHull(points)
+    if hull.equations[:, 3].max() >= 0:
+        raise InvalidMeshError(f"the center of mass {center} lies outside the part's convex hull")
     return Hull(
         points[hull.simplices],
         hull.simplices.astype(np.int64),

@@ -22,14 +22,20 @@ from reach.transforms import as_transform
 if TYPE_CHECKING:
     from reach.objects import GraspObject
 
-VERSION = 2
+VERSION = 6
 MIN_PROBABILITY = 0.01
 """Poses below this probability are not planned on."""
 NEGLIGIBLE_HUMP = 1e-4
 """A part rolls on over an edge that lifts its center of mass by less than this [m]: the
 height of a printed layer."""
-SAME_FACET = np.radians(5.0)
-"""Resting facets whose normals agree to this angle, up to symmetry, are one pose [rad]."""
+ROLL_WINDOW = np.radians(15.0)
+"""... unless it has rolled by more than this: a part that rolls freely but is not round has a
+pose every so often, so that each pose tells how the part lies. Resting facets of one height
+that are nearer, up to symmetry, are one pose [rad]."""
+ROLL_FALL = 5e-4
+"""Beyond the window too a part rolls on if that lowers its center of mass by this [m]."""
+_LEVEL = 1e-9
+"""Rises below this are rounding: there is no hump at all [m]."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -62,9 +68,7 @@ def stable_poses(
         obj: the part.
         min_probability: less probable poses are left out; with 0 the probabilities sum to one.
     """
-    key = cache_key(
-        "stable poses", VERSION, NEGLIGIBLE_HUMP, obj.content_hash, tuple(np.round(obj.com, 9))
-    )
+    key = cache_key("stable poses", VERSION, obj.content_hash, tuple(np.round(obj.com, 9)))
 
     def compute() -> dict[str, FloatArray]:
         hull = convex_hull(obj.vertices, obj.com)
@@ -102,9 +106,11 @@ def _basins(hull: Hull, hump: float) -> IntArray:
     """Resting facet that each facet's landing ends on, shape (F,).
 
     Passes between facets are visited from the lowest up; a pass joins two basins if it rises
-    less than the hump over the shallower one (persistence of the height function).
+    less than the hump over the shallower one (persistence of the height function), and if the
+    part has not rolled far on one level in between.
     """
     heights = hull.heights
+    least_cosine = np.cos(ROLL_WINDOW)
     facets, across, passes = _passes(hull, heights)
     parent = np.arange(len(heights))
 
@@ -117,7 +123,10 @@ def _basins(hull: Hull, hump: float) -> IntArray:
     rank = _tie_breaking_rank(hull, heights)
     for a, b, height in zip(facets, across, passes, strict=True):
         low, high = sorted((root(a), root(b)), key=rank.__getitem__)
-        if low != high and height - heights[high] <= hump:
+        if low == high or height - heights[high] > hump:
+            continue
+        downhill = height - heights[high] <= _LEVEL or heights[high] - heights[low] > ROLL_FALL
+        if downhill or hull.normals[low] @ hull.normals[high] >= least_cosine:
             parent[high] = low
     return np.array([root(facet) for facet in range(len(heights))])
 
@@ -166,7 +175,7 @@ def _merged(
             other
             for other in sums
             if abs(heights[facet] - heights[other]) <= same_height
-            and sym.equivalent_directions(normals[facet], normals[other]) < SAME_FACET
+            and sym.equivalent_directions(normals[facet], normals[other]) < ROLL_WINDOW
         )
         first = next(same, int(facet))
         sums[first] = sums.get(first, 0.0) + float(probability)

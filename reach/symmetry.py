@@ -19,11 +19,11 @@ from reach.transforms import make_transform, rotation_about
 if TYPE_CHECKING:
     from reach.objects import GraspObject
 
-VERSION = 1
-RELATIVE_TOLERANCE = 5e-3
-LARGEST_TOLERANCE = 5e-4
+VERSION = 4
+RELATIVE_TOLERANCE = 7.5e-3
+LARGEST_TOLERANCE = 4e-4
 """A rotation is a symmetry if no surface point leaves the surface by more than the smaller of
-RELATIVE_TOLERANCE times the diameter and LARGEST_TOLERANCE [m]."""
+RELATIVE_TOLERANCE times the span about the center and LARGEST_TOLERANCE [m]."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -117,7 +117,9 @@ def pose_distance(sym: Symmetry, T_a: FloatArray, T_b: FloatArray) -> tuple[floa
 
 def tolerance(obj: GraspObject) -> float:
     """How far a surface point may leave the surface under a symmetry [m]."""
-    return min(RELATIVE_TOLERANCE * obj.diameter, LARGEST_TOLERANCE)
+    # Not the bounding box's diagonal, which changes as the mesh is turned.
+    span = 2 * float(np.linalg.norm(obj.vertices - obj.com, axis=1).max())
+    return min(RELATIVE_TOLERANCE * span, LARGEST_TOLERANCE)
 
 
 def half_turn(axis: FloatArray) -> FloatArray:

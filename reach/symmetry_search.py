@@ -25,6 +25,8 @@ if TYPE_CHECKING:
 EQUAL_MOMENTS = 0.02
 """Relative difference below which two principal moments may be equal."""
 LARGEST_ORDER = 48
+MAX_CRYSTAL_ORDER = 12
+"""Largest order tried about each of many axes, where inertia names none."""
 MAX_CRITICAL_AXES = 400
 SAME_ROTATION = np.radians(2.0)
 SURFACE_SAMPLES = 2000
@@ -113,10 +115,13 @@ def _search_axial(surface: _Surface, axis: FloatArray) -> Symmetry:
     return _finite(surface, generators + ([] if flip_found is None else [flip_found]))
 
 
-def _order(surface: _Surface, axis: FloatArray) -> int:
-    """Largest n such that a turn by 2 pi / n is a symmetry."""
-    for n in range(LARGEST_ORDER, 1, -1):
-        if surface.holds(rotation_about(axis, 2 * np.pi / n)):
+def _order(surface: _Surface, axis: FloatArray, largest: int = LARGEST_ORDER) -> int:
+    """Largest n such that every turn by a multiple of 2 pi / n is a symmetry."""
+    for n in range(largest, 1, -1):
+        # One turn alone deceives: a 13th of a turn nearly maps a twelve-sided bar to itself.
+        if all(
+            surface.holds(rotation_about(axis, 2 * np.pi * k / n)) for k in range(1, n // 2 + 1)
+        ):
             return n
     return 1
 
@@ -147,9 +152,7 @@ def _search_isotropic(surface: _Surface, axes: FloatArray) -> Symmetry:
             continue
         if surface.revolves(axis):
             return _search_axial(surface, axis)
-        order = next(
-            (n for n in (5, 4, 3, 2) if surface.holds(rotation_about(axis, 2 * np.pi / n))), 1
-        )
+        order = _order(surface, axis, largest=MAX_CRYSTAL_ORDER)
         if order > 1:
             generators.append(rotation_about(axis, 2 * np.pi / order))
     return _finite(surface, generators)
