@@ -7,15 +7,19 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from reach.symmetry import pose_distance
 from registration.evidence import pairwise_margins
 from registration.job import Job
-from registration.search import FREE, Hypothesis
+from registration.search import Hypothesis
 
 CLEARLY_WORSE = 0.15
 """A pose whose render cost is this far above the best one's needs no closer comparison."""
 REFUTED = 0.4
 """With this much evidence for another stable pose, the declared one is taken to be wrong."""
 MOST_RIVALS = 5
+VARIANT, TURNED = 1.8e-3, np.radians(5.0)
+"""A part that is nearly symmetric (a gear with a keyway) may be turned with its surfaces parting
+by less than `SensorProfile.distinct`; that is another pose from these distances on [m, rad]."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -101,5 +105,9 @@ def _margins(
 
 
 def _differ(job: Job, a: Hypothesis, b: Hypothesis) -> bool:
+    """Whether two poses put the part's surface elsewhere; symmetric poses do not differ."""
     apart = job.model.surface_distance(a.T_camera_object, b.T_camera_object)
-    return apart > job.profile.distinct
+    if apart < min(VARIANT, job.profile.distinct):
+        return False
+    turn, _ = pose_distance(job.sym, a.T_camera_object, b.T_camera_object)
+    return apart > job.profile.distinct or turn > TURNED

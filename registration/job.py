@@ -10,6 +10,7 @@ import numpy as np
 
 from reach.objects import GraspObject
 from reach.stable_poses import StablePose, stable_poses
+from reach.symmetry import symmetry
 from registration.frame import DepthFrame
 from registration.mesh_model import mesh_model
 from registration.observation import scan
@@ -41,6 +42,7 @@ class Job:
         with self.timed("prepare"):
             self.model = mesh_model(obj)
             self.poses: tuple[StablePose, ...] = stable_poses(obj)
+            self.sym = symmetry(obj)
         with self.timed("table"):
             self.table = fit_table(
                 frame,

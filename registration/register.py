@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import Literal, get_args
 
 import numpy as np
@@ -10,13 +9,12 @@ import numpy as np
 from reach.errors import InvalidInputError, UnknownNameError
 from reach.objects import GraspObject
 from reach.stable_poses import stable_poses
-from reach.symmetry import symmetry
 from registration.decision import Decision, decide
 from registration.errors import NoGoodPoseError, TiltedPoseError
 from registration.frame import DepthFrame
 from registration.job import Job
 from registration.options import RegistrationOptions
-from registration.polish import Polished, polish
+from registration.refine import fit_of, refine
 from registration.resting import nearest_stable_pose
 from registration.result import Registration, Rival, TableFit
 from registration.search import FREE, Hypothesis
@@ -62,11 +60,11 @@ def register(
     declared = _declared(obj, stable_pose, mode)
     job = Job(obj, frame, options, seed)
     found = _search(job, mode, declared)
+    with job.timed("refine"):
+        found = refine(job, found, declared)
     with job.timed("decide"):
         decision = decide(job, found, declared)
-    with job.timed("polish"):
-        decision, polished = _polish(job, decision)
-    return _report(job, decision, polished, mode)
+    return _report(job, decision, mode)
 
 
 def _declared(obj: GraspObject, stable_pose: int | None, mode: str) -> int | None:
@@ -115,28 +113,11 @@ def _explains(job: Job, found: list[Hypothesis]) -> bool:
     return any(hypothesis.cost <= job.profile.max_cost for hypothesis in found)
 
 
-def _polish(job: Job, decision: Decision) -> tuple[Decision, Polished]:
-    """Refine the chosen pose; the refined one is kept only if it explains the image as well."""
-    chosen = decision.chosen
-    search = chosen.search
-    polished = polish(
-        job.model,
-        search.seen,
-        chosen.T_camera_object,
-        job.profile,
-        on_table=chosen.stable_pose != FREE,
-    )
-    cost = float(search.check(polished.T_camera_object[None]).cost[0])
-    if cost > chosen.cost + 0.01:
-        return decision, replace(polished, T_camera_object=chosen.T_camera_object)
-    refined = replace(chosen, T_camera_object=polished.T_camera_object, cost=cost)
-    return replace(decision, chosen=refined), polished
-
-
-def _report(job: Job, decision: Decision, polished: Polished, mode: str) -> Registration:
+def _report(job: Job, decision: Decision, mode: str) -> Registration:
     chosen, up = decision.chosen, job.table.normal_camera
-    T_camera_object = polished.T_camera_object
-    index, tilt = nearest_stable_pose(T_camera_object, up, job.poses, symmetry(job.obj))
+    polished = fit_of(job, chosen)
+    T_camera_object = chosen.T_camera_object
+    index, tilt = nearest_stable_pose(T_camera_object, up, job.poses, job.sym)
     if chosen.stable_pose == FREE:
         leaning = not tilt <= job.options.max_tilt
         if leaning and mode != "free":

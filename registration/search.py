@@ -15,6 +15,7 @@ from registration.hypotheses import free_starts, planar_starts, put_where_seen
 from registration.mesh_model import MeshModel
 from registration.observation import Observation
 from registration.options import SensorProfile
+from registration.polish import Polished
 from registration.quick_check import seen_through
 from registration.render_check import RenderCheck, render_check
 
@@ -41,12 +42,14 @@ class Hypothesis:
         stable_pose: index of the stable pose it keeps to, or FREE.
         cost: render cost.
         search: that found it.
+        polished: its exact fit, None before it is refined.
     """
 
     T_camera_object: FloatArray
     stable_pose: int
     cost: float
     search: Search
+    polished: Polished | None = None
 
 
 @dataclass(frozen=True, slots=True, eq=False)

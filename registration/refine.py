@@ -1,0 +1,114 @@
+"""Bring the finalists to their best before they are compared.
+
+Gauss-Newton on distances sees only where points lie, not what the camera would have seen of
+the part besides: a handle at the rim of the silhouette moves the render cost long before it
+moves a distance. A short pattern search on the render cost finds such turns.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from reach.arrays import FloatArray
+from reach.transforms import exp
+from registration.job import Job
+from registration.polish import Polished, polish
+from registration.search import FREE, Hypothesis
+
+NEAR = 0.06
+"""Hypotheses this close to the best render cost are refined."""
+MOST = 4
+TURNS = np.radians([1.0, 2.5, 6.0, 12.0])
+SHIFT = 2.0
+"""Slides tried, in units of the noise."""
+ROUNDS = 3
+GAIN = 0.003
+"""A pattern step must lower the render cost by this much to be worth leaving the fitted pose."""
+
+
+def refine(job: Job, found: Sequence[Hypothesis], declared: int | None) -> list[Hypothesis]:
+    """Refine the best hypotheses, and the best one of the declared stable pose.
+
+    Args:
+        job: the registration.
+        found: hypotheses by rising cost.
+        declared: index of the declared stable pose, None if there is none.
+
+    Returns:
+        All hypotheses by rising cost, those that may win refined.
+    """
+    chosen = [i for i, h in enumerate(found) if h.cost <= found[0].cost + NEAR][:MOST]
+    own = [i for i, h in enumerate(found) if h.stable_pose == declared]
+    if own and own[0] not in chosen:
+        chosen.append(own[0])
+    result = list(found)
+    for i in chosen:
+        result[i] = _refined(job, found[i])
+    return sorted(result, key=lambda hypothesis: hypothesis.cost)
+
+
+def _refined(job: Job, start: Hypothesis) -> Hypothesis:
+    fitted = _fitted(job, start)
+    settled = _settle(fitted, job.table.normal_camera, job.obj.com, job.table.noise)
+    if settled.cost > fitted.cost - GAIN:
+        return fitted
+    again = _fitted(job, settled)
+    return again if again.cost < settled.cost else replace(settled, polished=again.polished)
+
+
+def fit_of(job: Job, hypothesis: Hypothesis) -> Polished:
+    """The hypothesis's exact fit, made now if it was not refined."""
+    if hypothesis.polished is not None:
+        return hypothesis.polished
+    return polish(
+        job.model,
+        hypothesis.search.seen,
+        hypothesis.T_camera_object,
+        job.profile,
+        on_table=hypothesis.stable_pose != FREE,
+    )
+
+
+def _fitted(job: Job, start: Hypothesis) -> Hypothesis:
+    """The hypothesis at its exact fit, or where it was if the fit explains the image less."""
+    fit = fit_of(job, replace(start, polished=None))
+    cost = float(start.search.check(fit.T_camera_object[None]).cost[0])
+    if cost > start.cost + 0.01:
+        return replace(start, polished=fit)
+    return replace(start, T_camera_object=fit.T_camera_object, cost=cost, polished=fit)
+
+
+def _settle(start: Hypothesis, up_camera: FloatArray, com: FloatArray, noise: float) -> Hypothesis:
+    """Pattern search of the render cost over turns and slides on the table."""
+    best, search = start, start.search
+    for halvings in range(ROUNDS):
+        shrink = 0.5**halvings
+        T = _neighbors(best.T_camera_object, up_camera, com, shrink, SHIFT * noise * shrink)
+        cost = search.check(T).cost
+        least = int(np.argmin(cost))
+        if cost[least] < best.cost - GAIN / 2:
+            best = replace(best, T_camera_object=T[least], cost=float(cost[least]))
+        elif best is start and halvings > 0:
+            break
+    return best
+
+
+def _neighbors(
+    T_camera_object: FloatArray, up_camera: FloatArray, com: FloatArray, shrink: float, shift: float
+) -> FloatArray:
+    """The pose turned about the vertical through its center of mass, or slid, (N, 4, 4)."""
+    up = T_camera_object[:3, :3].T @ up_camera
+    x = np.cross(up, np.eye(3)[np.argmin(np.abs(up))])
+    x /= np.linalg.norm(x)
+    y = np.cross(up, x)
+    turns = [
+        np.concatenate([angle * up, np.cross(com, angle * up)])
+        for angle in np.concatenate([TURNS, -TURNS]) * shrink
+    ]
+    slides = [
+        np.concatenate([np.zeros(3), way * shift * axis]) for axis in (x, y) for way in (1, -1)
+    ]
+    return np.stack([T_camera_object @ exp(xi) for xi in turns + slides])
