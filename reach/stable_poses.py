@@ -22,7 +22,7 @@ from reach.transforms import as_transform
 if TYPE_CHECKING:
     from reach.objects import GraspObject
 
-VERSION = 6
+VERSION = 7
 MIN_PROBABILITY = 0.01
 """Poses below this probability are not planned on."""
 NEGLIGIBLE_HUMP = 1e-4
@@ -30,8 +30,9 @@ NEGLIGIBLE_HUMP = 1e-4
 height of a printed layer."""
 ROLL_WINDOW = np.radians(15.0)
 """... unless it has rolled by more than this: a part that rolls freely but is not round has a
-pose every so often, so that each pose tells how the part lies. Resting facets of one height
-that are nearer, up to symmetry, are one pose [rad]."""
+pose every so often, so that each pose tells how the part lies [rad]."""
+SAME_FACET = np.radians(5.0)
+"""Resting facets of one height that are nearer, up to symmetry, are one pose [rad]."""
 ROLL_FALL = 5e-4
 """Beyond the window too a part rolls on if that lowers its center of mass by this [m]."""
 _LEVEL = 1e-9
@@ -175,7 +176,7 @@ def _merged(
             other
             for other in sums
             if abs(heights[facet] - heights[other]) <= same_height
-            and sym.equivalent_directions(normals[facet], normals[other]) < ROLL_WINDOW
+            and sym.equivalent_directions(normals[facet], normals[other]) < SAME_FACET
         )
         first = next(same, int(facet))
         sums[first] = sums.get(first, 0.0) + float(probability)
