@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -25,6 +26,8 @@ from reach.arrays import FloatArray, IntArray
 from reach.gripper import Box, Jaw, ParallelJawGripper
 from reach.transforms import inverse, make_transform
 
+Show = Callable[..., None]
+"""Draws archetypes at an entity."""
 WORLD = "world"
 OBJECT = f"{WORLD}/object"
 TRUTH_FRAME = "object_truth"
@@ -40,7 +43,9 @@ def show_scene(stage: Stage, record: TrialRecord, *, blind: bool) -> None:
     """Draw everything that stands or moves in the world."""
     stage.static(WORLD, rr.ViewCoordinates.RIGHT_HAND_Z_UP)
     _show_table(stage, record)
-    gripper = _gripper(record)
+    gripper = recorded_gripper(record)
+    if GRIPPER_FRAME not in record.frames:
+        gripper = None
     _show_robot(stage, record, skip_hand=gripper is not None)
     if gripper is not None:
         _show_gripper(stage, record, gripper)
@@ -99,18 +104,17 @@ def _solid(shape: Shape) -> Any:
     return rr.Capsules3D(radii=[size[0]], lengths=[size[1]], translations=[start], **style)
 
 
-def _gripper(record: TrialRecord) -> ParallelJawGripper | None:
+def recorded_gripper(record: TrialRecord) -> ParallelJawGripper | None:
+    """The hand that the record describes, if any."""
     attached = record.attachments.get(GRIPPER_DESCRIPTION)
-    if attached is None or GRIPPER_FRAME not in record.frames:
-        return None
-    return read_gripper(attached.data)
+    return None if attached is None else read_gripper(attached.data)
 
 
 def _show_gripper(stage: Stage, record: TrialRecord, gripper: ParallelJawGripper) -> None:
     track = record.frames[GRIPPER_FRAME]
     hand = f"{WORLD}/hand"
     stage.poses(hand, track.time_ns, track.transforms())
-    _show_boxes(stage, f"{hand}/palm", gripper.palm, colors.PALM)
+    show_fingers(stage.static, hand, gripper)
     widths = np.clip(record.jaw.widths, 0.0, gripper.max_opening)
     for number, jaw in enumerate(gripper.jaws):
         entity = f"{hand}/jaw_{number}"
@@ -118,17 +122,24 @@ def _show_gripper(stage: Stage, record: TrialRecord, gripper: ParallelJawGripper
         moved = np.tile(np.eye(4), (len(widths), 1, 1))
         moved[:, :3, 3] = travel
         stage.poses(entity, record.jaw.time_ns, moved)
-        _show_boxes(stage, f"{entity}/finger", jaw.boxes, colors.FINGER)
-        _show_pad(stage, f"{entity}/pad", jaw)
 
 
-def _show_boxes(stage: Stage, entity: str, boxes: tuple[Box, ...], color: colors.Color) -> None:
+def show_fingers(show: Show, hand: str, gripper: ParallelJawGripper) -> None:
+    """Draw the hand's solids, each jaw at full opening below its own entity `jaw_N`."""
+    _show_boxes(show, f"{hand}/palm", gripper.palm, colors.PALM)
+    for number, jaw in enumerate(gripper.jaws):
+        entity = f"{hand}/jaw_{number}"
+        _show_boxes(show, f"{entity}/finger", jaw.boxes, colors.FINGER)
+        _show_pad(show, f"{entity}/pad", jaw)
+
+
+def _show_boxes(show: Show, entity: str, boxes: tuple[Box, ...], color: colors.Color) -> None:
     for number, box in enumerate(boxes):
         solid = rr.Boxes3D(half_sizes=[box.half_extents], colors=[color], fill_mode="solid")
-        stage.static(f"{entity}_{number}", placed(box.T_gripper_box), solid)
+        show(f"{entity}_{number}", placed(box.T_gripper_box), solid)
 
 
-def _show_pad(stage: Stage, entity: str, jaw: Jaw) -> None:
+def _show_pad(show: Show, entity: str, jaw: Jaw) -> None:
     """The soft layer: the outline, from its face back by its thickness."""
     outline = jaw.pad.polygon
     count = len(outline)
@@ -140,7 +151,7 @@ def _show_pad(stage: Stage, entity: str, jaw: Jaw) -> None:
         j = (i + 1) % count
         faces += [(i, count + i, count + j), (i, count + j, j)]
     mesh = flat_mesh(np.vstack([front, back])[np.array(faces)], colors.PAD)
-    stage.static(entity, placed(jaw.T_gripper_pad_open), mesh)
+    show(entity, placed(jaw.T_gripper_pad_open), mesh)
 
 
 def _show_planned_grasp(stage: Stage, record: TrialRecord, gripper: ParallelJawGripper) -> None:
