@@ -5,7 +5,10 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
-from reach.arrays import FloatArray, frozen_finite
+import numpy as np
+
+from reach.arrays import FloatArray, frozen
+from reach.errors import InvalidInputError
 from reach.transforms import as_transform
 
 Parameter = float | bool | str
@@ -44,7 +47,8 @@ class Execution:
 
     Args:
         T_world_object: registered pose, shape (4, 4).
-        covariance: of it, shape (6, 6), (rotation [rad], translation [m]), object frame.
+        covariance: of it, shape (6, 6), (rotation [rad], translation [m]), object frame; infinite
+            in a direction that the image does not tell.
         T_world_gripper: measured when the jaws had closed, shape (4, 4).
         T_object_gripper: the grasp as executed on the registered object, shape (4, 4).
         jaw_width: between the pads at the end of the hold [m].
@@ -71,7 +75,11 @@ class Execution:
             if value is not None:
                 object.__setattr__(self, name, as_transform(value, name))
         if self.covariance is not None:
-            covariance = frozen_finite(self.covariance, "pose covariance", (6, 6))
+            covariance = frozen(self.covariance)
+            if covariance.shape != (6, 6) or np.any(np.isnan(covariance)):
+                raise InvalidInputError(
+                    f"pose covariance has shape {covariance.shape} or NaN, expected (6, 6) numbers"
+                )
             object.__setattr__(self, "covariance", covariance)
 
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -57,7 +56,7 @@ def session_dataset(path: Path, *, unblinded: bool = False) -> Dataset:
         gripper=_gripper(facts),
         trials=trials,
         left_out=tuple(_left_out(trial, name) for trial in state.order if trial not in counted),
-        pose_error=_pose_error(trials),
+        pose_error=_pose_error(trials, folder.descriptor.config.get("pose_error")),
         notes=_notes(counted, unblinded),
     )
 
@@ -177,7 +176,7 @@ def _execution(take: TakeState, facts: RecordFacts) -> Execution:
     measured: Mapping[str, float] = done.measurements if done else {}
     return Execution(
         T_world_object=None if found is None else found.T_world_object,
-        covariance=_finite(None if found is None else found.covariance),
+        covariance=None if found is None else found.covariance,
         T_world_gripper=None if done is None else done.T_world_gripper,
         T_object_gripper=None if done is None else done.executed.T_object_gripper,
         jaw_width=width if width is not None else measured.get("width"),
@@ -185,11 +184,6 @@ def _execution(take: TakeState, facts: RecordFacts) -> Execution:
         sensor_verdict=None if done is None else done.sensor_verdict,
         time_ns=take.executed_ns if done is None else done.time_ns,
     )
-
-
-def _finite(covariance: Any) -> Any:
-    """A covariance with unbounded directions cannot be averaged or written as numbers."""
-    return covariance if covariance is not None and np.all(np.isfinite(covariance)) else None
 
 
 def _score(event: Scored) -> StoredScore:
@@ -209,18 +203,30 @@ def _left_out(trial: TrialState, session: str) -> LeftOut:
     )
 
 
-def _pose_error(trials: Iterable[LabeledTrial]) -> StatedPoseError | None:
-    """Root mean square of the registrations' own standard deviations."""
+def _pose_error(trials: Iterable[LabeledTrial], station: object) -> StatedPoseError | None:
+    """Root mean square of the registrations' own deviations, and the station's beside them.
+
+    Args:
+        trials: those that count.
+        station: `pose_error` of the session's configuration, calibration and actuation together:
+            {"translation": [m], "rotation": [rad]}; None if it has none.
+    """
     covariances = [t.execution.covariance for t in trials if t.execution.covariance is not None]
     if not covariances:
         return None
-    variances = np.mean([np.diag(covariance) for covariance in covariances], axis=0)
-    return StatedPoseError(
-        float(np.sqrt(variances[3:].mean())),
-        float(np.sqrt(variances[:3].mean())),
-        f"root mean square of {len(covariances)} registrations' stated covariances; calibration "
-        "and actuation not included",
-    )
+    diagonals = np.array([np.diag(covariance) for covariance in covariances])
+    # A direction that the image cannot tell is one the part is symmetric about: no grasp can
+    # tell it either.
+    variances = np.where(np.isfinite(diagonals), diagonals, 0.0).mean(axis=0)
+    translation, rotation = variances[3:].mean(), variances[:3].mean()
+    basis = f"root mean square of {len(covariances)} registrations' stated covariances"
+    if isinstance(station, dict):
+        translation += float(station["translation"]) ** 2
+        rotation += float(station["rotation"]) ** 2
+        basis += ", and the station's stated calibration and actuation error"
+    else:
+        basis += "; calibration and actuation not included"
+    return StatedPoseError(float(np.sqrt(translation)), float(np.sqrt(rotation)), basis)
 
 
 def _notes(trials: Sequence[TrialState], unblinded: bool) -> tuple[str, ...]:

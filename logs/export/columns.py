@@ -120,7 +120,8 @@ BASE_COLUMNS: tuple[Column, ...] = (
     Column(
         "registration_covariance",
         "numbers",
-        "of the registered pose, 6x6 row-major, (rotation, translation), object frame",
+        "of the registered pose, 6x6 row-major, (rotation, translation), object frame; infinite in "
+        "a direction that the image does not tell",
         lambda t: _flat(t.execution.covariance),
         "rad, m",
         nullable=True,

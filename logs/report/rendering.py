@@ -176,7 +176,12 @@ def _camera(azimuth: float, elevation: float) -> tuple[FloatArray, FloatArray, F
 
 
 def _pixels(
-    framed: FloatArray, right: FloatArray, up: FloatArray, ahead: FloatArray, width: int, height: int
+    framed: FloatArray,
+    right: FloatArray,
+    up: FloatArray,
+    ahead: FloatArray,
+    width: int,
+    height: int,
 ) -> FloatArray:
     """Where each pixel's ray begins, shape (H * W, 3), world."""
     x, y = framed @ right, framed @ up

@@ -11,7 +11,7 @@ import numpy as np
 from reach.arrays import FloatArray
 from reach.gripper import ParallelJawGripper
 from reach.objects import GraspObject
-from reach.transforms import quat_wxyz_from_rotation, rotation_from_quat_wxyz
+from reach.transforms import quat_wxyz_from_rotation
 from reach.world.grasp_model import (
     HAND_DOF,
     HAND_QPOS,
@@ -58,6 +58,7 @@ class GraspWorld:
         self._remainder = 0.0
         _put(self._data.qpos[OBJECT_QPOS], T_world_object)
         self.teleport(T_world_gripper)
+        mujoco.mj_forward(self._model, self._data)
 
     @property
     def gripper(self) -> ParallelJawGripper:
@@ -88,8 +89,13 @@ class GraspWorld:
     @property
     def pad_forces(self) -> FloatArray:
         """Normal force on each pad, from its springs, shape (J,) [N]."""
+        return np.array([forces.sum() for forces in self.pin_forces])
+
+    @property
+    def pin_forces(self) -> tuple[FloatArray, ...]:
+        """Force of each pin's spring, shape (P,) a jaw [N]; see `reach.world.pads.pin_bed`."""
         springs = zip(self._built.pin_qpos, self._built.pin_stiffness, strict=True)
-        return np.array([float(self._data.qpos[at] @ stiffness) for at, stiffness in springs])
+        return tuple(self._data.qpos[at] * stiffness for at, stiffness in springs)
 
     @property
     def wrist_force(self) -> float:
@@ -136,7 +142,6 @@ class GraspWorld:
         _put(self._data.qpos[HAND_QPOS], T_world_gripper)
         self._data.qvel[HAND_DOF] = 0.0
         self.set_target(T_world_gripper)
-        mujoco.mj_forward(self._model, self._data)
 
     def set_target(self, T_world_gripper: FloatArray) -> None:
         """Where the wrist shall go."""
@@ -165,7 +170,8 @@ def _put(qpos: FloatArray, T: FloatArray) -> None:
 
 
 def _pose(qpos: FloatArray) -> FloatArray:
-    T = np.eye(4)
-    T[:3, :3] = rotation_from_quat_wxyz(qpos[3:])
+    rotation, T = np.empty(9), np.eye(4)
+    mujoco.mju_quat2Mat(rotation, qpos[3:])
+    T[:3, :3] = rotation.reshape(3, 3)
     T[:3, 3] = qpos[:3]
     return T
