@@ -20,15 +20,17 @@ from collection.simulation_settings import SimulationSettings
 from reach.arrays import FloatArray, frozen
 from reach.gripper import ParallelJawGripper
 from reach.objects import GraspObject
-from reach.transforms import exp, make_transform, rotation_about
+from reach.transforms import apply, exp, make_transform, rotation_about
 from reach.world.grasp_world import GraspWorld
 from reach.world.parameters import WorldParameters
 
 PLACEMENTS_TRIED = 200
 SETTLING_TIME = 0.4
 PARKED = make_transform(None, (0.0, 0.0, 10.0))
-SAFE_DISTANCE = 0.22
-"""The hand's solids end this far from its origin; beyond it nothing can touch the object [m]."""
+NEAR = 0.01
+"""Physics is stepped while the hand's bounding box is this near the object's sphere [m]."""
+LOOK_PERIOD = 0.02
+"""Between two looks at a held object [s]."""
 SLIPPERY = 0.02
 
 
@@ -110,6 +112,9 @@ class Simulation:
         self._opening = gripper.max_opening
         self._jaw_force = 0.0
         self._T_motion_error = make_transform()
+        self._hand_center, self._hand_half = _bounding_box(gripper)
+        self._next_look_ns = 0
+        self._sphere: tuple[GraspObject, FloatArray, float] | None = None
         clock.follow(self._advance)
 
     # -- what a person does at the table ------------------------------------------------------
@@ -231,10 +236,10 @@ class Simulation:
             return False
         if self._jaw_force > 0 or not self._world.at_rest():
             return True
-        obj = self._world.object
-        center = self._world.T_world_object[:3, :3] @ obj.com + self._world.T_world_object[:3, 3]
-        distance = float(np.linalg.norm(self._T_world_hand[:3, 3] - center))
-        return distance < SAFE_DISTANCE + 0.5 * obj.diameter
+        center, radius = self._bounding_sphere
+        in_hand = self._T_world_hand[:3, :3].T @ (center - self._T_world_hand[:3, 3])
+        outside = np.maximum(np.abs(in_hand - self._hand_center) - self._hand_half, 0.0)
+        return float(outside @ outside) < (radius + NEAR) ** 2
 
     @property
     def carrying(self) -> bool:
@@ -273,14 +278,26 @@ class Simulation:
             return
         if self.dynamic or self._jaw_force != 0.0:
             self._world.advance(seconds)
-        if self._watcher is not None:
+        if self._watcher is not None and self.clock.now_ns() >= self._next_look_ns:
             self._watcher.look(self.clock.now_ns(), holding=self.carrying)
+            self._next_look_ns = self.clock.now_ns() + round(LOOK_PERIOD * 1e9)
         self._opening = self._world.opening
 
     def _drift_empty_jaws(self, seconds: float) -> None:
         direction = float(np.sign(self._jaw_force))
         moved = self._opening - 2.0 * direction * self.settings.closing_speed * seconds
         self._opening = float(np.clip(moved, 0.0, self.gripper.max_opening))
+
+    @property
+    def _bounding_sphere(self) -> tuple[FloatArray, float]:
+        """Center, world frame (3,), and radius of a sphere around the object [m]."""
+        world = self._placed()
+        obj, T = world.object, world.T_world_object
+        if self._sphere is None or self._sphere[0] is not obj:
+            middle = 0.5 * (obj.vertices.min(axis=0) + obj.vertices.max(axis=0))
+            radius = float(np.linalg.norm(obj.vertices - middle, axis=1).max())
+            self._sphere = (obj, middle, radius)
+        return T[:3, :3] @ self._sphere[1] + T[:3, 3], self._sphere[2]
 
     def _placed(self) -> GraspWorld:
         if self._world is None:
@@ -313,3 +330,13 @@ class Simulation:
         about_pads = exp(np.concatenate([tilt, np.zeros(3)]))
         about_pads = make_transform(about_pads[:3, :3], pads - about_pads[:3, :3] @ pads + offset)
         return HiddenDraws(world, about_pads, max(0.5, factor))
+
+
+def _bounding_box(gripper: ParallelJawGripper) -> tuple[FloatArray, FloatArray]:
+    """Center and half extents (3,) of the open hand's box, gripper frame [m]."""
+    corners = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)], dtype=float)
+    points = np.concatenate(
+        [apply(box.T_gripper_box, corners * box.half_extents) for box in gripper.boxes()]
+    )
+    low, high = points.min(axis=0), points.max(axis=0)
+    return 0.5 * (low + high), 0.5 * (high - low)

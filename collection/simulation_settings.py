@@ -59,7 +59,7 @@ class SimulationSettings(_Section):
     guarded_force: float = Field(default=12.0, gt=0)
     hard_force: float = Field(default=60.0, gt=0)
     emergency_stop_time: float = Field(default=5.0, ge=0)
-    timestep: float = Field(default=2e-3, gt=0, le=5e-3)
+    timestep: float = Field(default=4e-3, gt=0, le=5e-3)
     sample_period: float = Field(default=0.04, gt=0)
     faults: tuple[ScriptedFault, ...] = ()
 

@@ -27,6 +27,7 @@ if TYPE_CHECKING:
     from collection.robots.protocol import Arm, GripperDevice
     from collection.simulation import Simulation, Workspace
     from reach.gripper import ParallelJawGripper
+    from reach.pose_error import PoseError
 
 PACKAGED = Path(__file__).parent
 GRIPPERS = ("yumi",)
@@ -56,6 +57,35 @@ class GripperConfig(_Section):
     geometry: str = "yumi"
 
 
+class PoseErrorConfig(_Section):
+    """What the station knows of its own errors, beside each registration's own: measured once.
+
+    All are standard deviations of one coordinate or angle, at the workspace.
+
+    Attributes:
+        calibration_translation: of camera against robot [m].
+        calibration_rotation: [rad].
+        actuation_translation: of the gripper against its commanded pose [m].
+        actuation_rotation: [rad].
+    """
+
+    calibration_translation: float = Field(8e-4, ge=0)
+    calibration_rotation: float = Field(1e-3, ge=0)
+    actuation_translation: float = Field(5e-4, ge=0)
+    actuation_rotation: float = Field(2e-3, ge=0)
+
+    def total(self) -> PoseError:
+        """Calibration and actuation together, as an error of the object's pose."""
+        from reach.pose_error import PoseError
+
+        calibration = PoseError.isotropic(
+            translation=self.calibration_translation, rotation=self.calibration_rotation
+        )
+        return calibration + PoseError.isotropic(
+            translation=self.actuation_translation, rotation=self.actuation_rotation
+        )
+
+
 class StationConfig(_Section):
     """A validated station file.
 
@@ -64,6 +94,7 @@ class StationConfig(_Section):
         workspace: where objects are placed.
         gripper: the hand's shape.
         motion: numbers of the trial motion.
+        pose_error: of calibration and actuation, as the models are told.
         robot: the robot driver's own section.
         camera: the camera driver's own section.
         simulation: hidden draws and faults, for simulated stations only.
@@ -73,6 +104,7 @@ class StationConfig(_Section):
     workspace: WorkspaceConfig = WorkspaceConfig()
     gripper: GripperConfig = GripperConfig()
     motion: MotionSettings = MotionSettings()
+    pose_error: PoseErrorConfig = PoseErrorConfig()
     robot: InstanceOf[BaseModel]
     camera: InstanceOf[BaseModel]
     simulation: SimulationSettings | None = None

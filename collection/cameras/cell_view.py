@@ -172,7 +172,8 @@ class CellView:
         brightness = 0.45 + 0.55 * np.clip(normals @ light, 0.0, 1.0)
         brightness = np.where(shadow, 0.7 * brightness, brightness) * hit
         base = np.where(is_object[..., None], _OBJECT_COLOR, _TABLE_COLOR)
-        return (base * brightness[..., None]).astype(np.uint8)
+        color: NDArray[np.uint8] = (base * brightness[..., None]).astype(np.uint8)
+        return color
 
 
 def _span(values: FloatArray, size: int) -> slice | None:

@@ -238,7 +238,7 @@ def _put_down(arm: Arm, T: FloatArray, settings: MotionSettings, recorder: _Reco
         arm.move_to_pose(
             T,
             path=Path.LINEAR,
-            speed=settings.careful(),
+            speed=settings.lifting(),
             guarded=True,
             on_sample=recorder.arm_sample,
         )

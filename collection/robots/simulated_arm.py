@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from typing import Self
 
 import numpy as np
@@ -32,8 +33,18 @@ from reach.transforms import inverse, rotation_angle
 
 CONTROL_PERIOD = 4e-3
 """Between two targets of the wrist while physics is stepped [s]."""
+STRIDE = 10
+"""Control periods that a motion far from everything takes at once."""
 PEAK_OVER_MEAN = 1.5
 """Of the cubic speed profile."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Trajectory:
+    """Joints (K, J) and T_world_gripper (K, 4, 4) at every control period of a motion."""
+
+    joints: FloatArray
+    T_world_gripper: FloatArray
 
 
 class SimulatedArm:
@@ -191,28 +202,37 @@ class SimulatedArm:
         if not simulation.carrying:
             simulation.new_motion_error()
         self._slip_if_scripted(path)
-        duration = self._duration(path, speed)
-        elapsed, next_sample = 0.0, 0.0
-        while elapsed < duration:
-            elapsed = min(duration, elapsed + self._tick())
-            self._go_to(path, _eased(elapsed / duration), clock_step=self._tick())
-            self._watch(path, elapsed / duration, guarded=guarded)
-            if on_sample is not None and elapsed >= next_sample:
+        trajectory = self._trajectory(path, self._duration(path, speed))
+        step, next_sample_ns = 0, 0
+        while step < len(trajectory.joints) - 1:
+            step = self._advance(trajectory, step)
+            self._watch(path, step / (len(trajectory.joints) - 1), guarded=guarded)
+            if on_sample is not None and clock.now_ns() >= next_sample_ns:
                 on_sample(self._sample())
-                next_sample = elapsed + simulation.settings.sample_period
+                next_sample_ns = clock.now_ns() + round(simulation.settings.sample_period * 1e9)
         sample = self._sample()
         return Motion(start_ns, clock.now_ns(), sample.joints, sample.T_world_gripper)
 
-    def _tick(self) -> float:
+    def _advance(self, trajectory: _Trajectory, step: int) -> int:
+        """Go on to a later step of a motion; a long one where no physics needs small ones."""
         simulation = self._simulation
-        return CONTROL_PERIOD if simulation.dynamic else simulation.settings.sample_period
+        last = len(trajectory.joints) - 1
+        stride = 1 if simulation.dynamic else STRIDE
+        following = min(last, step + stride)
+        self._joints = trajectory.joints[following]
+        simulation.joints = self._joints
+        simulation.move_hand(trajectory.T_world_gripper[following])
+        simulation.clock.sleep((following - step) * CONTROL_PERIOD)
+        return following
 
-    def _go_to(self, path: JointPath, share: float, *, clock_step: float) -> None:
-        columns = [np.interp(share, path.shares, column) for column in path.joints.T]
-        self._joints = np.array(columns)
-        self._simulation.joints = frozen(self._joints)
-        self._simulation.move_hand(self._planner.forward(self._joints))
-        self._simulation.clock.sleep(clock_step)
+    def _trajectory(self, path: JointPath, duration: float) -> _Trajectory:
+        """The motion at every control period, starting and ending at rest."""
+        count = max(2, int(np.ceil(duration / CONTROL_PERIOD)) + 1)
+        share = np.linspace(0.0, 1.0, count)
+        eased = share * share * (3.0 - 2.0 * share)
+        columns = [np.interp(eased, path.shares, column) for column in path.joints.T]
+        joints = np.column_stack(columns)
+        return _Trajectory(frozen(joints), frozen(self._planner.forward(joints)))
 
     def _watch(self, path: JointPath, share: float, *, guarded: bool) -> None:
         """Stop the motion where something stops it."""
@@ -267,11 +287,6 @@ class SimulatedArm:
         joints = self._measured_joints()
         T = frozen(self._planner.forward(joints))
         return ArmSample(self._simulation.clock.now_ns(), joints, T)
-
-
-def _eased(share: float) -> float:
-    """Cubic profile: starts and ends at rest."""
-    return share * share * (3.0 - 2.0 * share)
 
 
 def _as_robot_error(kind: FaultKind) -> RobotError:
