@@ -1,4 +1,4 @@
-"""Nine parts that are hard to register, each in its own way; also used by the tests."""
+"""Ten parts that are hard to register, each in its own way; also used by the tests."""
 
 from __future__ import annotations
 
@@ -61,8 +61,12 @@ def _gear() -> Any:
     gear = _cylinder(12, 22)
     for angle in np.arange(0, 360, 30):
         gear += _box((8, 6, 12), (20, -3, 0)).rotate([0, 0, float(angle)])
-    hub = _cylinder(20, 10)
-    return gear + hub - _cylinder(40, 5, at=(0, 0, -5)) - _box((3, 4, 40), (4, -2, -5))
+    return gear + _cylinder(20, 10) - _cylinder(40, 5, at=(0, 0, -5))
+
+
+def _keyed_gear() -> Any:
+    """A gear whose only asymmetry is a keyway of 3 x 4 mm: finer than a stereo camera sees."""
+    return _gear() - _box((3, 4, 40), (4, -2, -5))
 
 
 def _mug() -> Any:
@@ -93,6 +97,7 @@ PARTS: dict[str, Callable[[], Any]] = {
     "bracket": _bracket,
     "pawn": _pawn,
     "gear": _gear,
+    "keyed_gear": _keyed_gear,
     "mug": _mug,
     "near_symmetric_box": _near_symmetric_box,
     "pipe_tee": _pipe_tee,

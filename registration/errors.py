@@ -23,3 +23,11 @@ class NoGoodPoseError(RegistrationError):
 
 class TiltedPoseError(RegistrationError):
     """The best pose is tilted against the table beyond tolerance."""
+
+
+class PictureError(ReachError):
+    """A picture of a registration cannot be drawn."""
+
+
+class CloudFileError(ReachError):
+    """A point cloud or its camera file cannot be read."""
