@@ -55,7 +55,8 @@ class Execution:
         jaw_force: measured closing force [N].
         sensor_verdict: what the gripper's own sensors say.
         time_ns: when the jaws had closed, nanoseconds since the epoch.
-        T_world_object_true: what really was, known of a simulation only.
+        rotation_error: true error of the registered pose [rad], known of a simulation only.
+        translation_error: the same [m].
     """
 
     T_world_object: FloatArray | None = None
@@ -66,11 +67,11 @@ class Execution:
     jaw_force: float | None = None
     sensor_verdict: str | None = None
     time_ns: int | None = None
-    T_world_object_true: FloatArray | None = None
+    rotation_error: float | None = None
+    translation_error: float | None = None
 
     def __post_init__(self) -> None:
-        transforms = "T_world_object T_world_gripper T_object_gripper T_world_object_true"
-        for name in transforms.split():
+        for name in ("T_world_object", "T_world_gripper", "T_object_gripper"):
             value = getattr(self, name)
             if value is not None:
                 object.__setattr__(self, name, as_transform(value, name))

@@ -183,6 +183,8 @@ def _execution(take: TakeState, facts: RecordFacts) -> Execution:
         jaw_force=measured.get("force"),
         sensor_verdict=None if done is None else done.sensor_verdict,
         time_ns=take.executed_ns if done is None else done.time_ns,
+        rotation_error=measured.get("true_registration_error_rotation"),
+        translation_error=measured.get("true_registration_error_translation"),
     )
 
 

@@ -56,13 +56,14 @@ def evaluate(
     - `reach evaluate sessions/mon sessions/tue --cross-validate --backend loky`
     """
     from collection.cli.evaluation_table import evaluation_table, print_table, progress_bars
+    from collection.cli.report import write_text
     from logs.dataset_sources import load_labeled
     from reach.evaluation.backends import cluster
     from reach.evaluation.compare import compare, scorers_of
 
     dataset = load_labeled(sources, unblinded=unblinded)
-    error, basis = _pose_error(dataset, pose_error)
-    scorers = scorers_of(_names(models))
+    error, basis = chosen_pose_error(dataset, pose_error)
+    scorers = scorers_of(model_names(models))
     cases = dataset.cases()
     with cluster(backend, scheduler), progress_bars() as progress:
         result = compare(
@@ -86,11 +87,12 @@ def evaluate(
         print(json.dumps(content))
         return
     if as_json is not None:
-        _write(as_json, json.dumps(content, indent=1) + "\n")
+        write_text(as_json, json.dumps(content, indent=1) + "\n")
     print_table(evaluation_table(content))
 
 
-def _names(models: str) -> list[str]:
+def model_names(models: str) -> list[str]:
+    """Names in a comma-separated list; `all` stands for every model."""
     from reach.models.registry import MODEL_NAMES
 
     if models == "all":
@@ -98,7 +100,7 @@ def _names(models: str) -> list[str]:
     return list(dict.fromkeys(name.strip() for name in models.split(",") if name.strip()))
 
 
-def _pose_error(dataset: Dataset, given: str | None) -> tuple[PoseError, dict[str, Any]]:
+def chosen_pose_error(dataset: Dataset, given: str | None) -> tuple[PoseError, dict[str, Any]]:
     """The pose error to use, and where it is from."""
     from logs.errors import DatasetError
     from reach.pose_error import PoseError
@@ -172,17 +174,9 @@ def _cross_validation(
 
 
 def _write_plots(result: Evaluation, folder: Path) -> None:
+    from collection.cli.report import write_text
     from logs.report.curves import precision_recall_svg, reliability_svg
 
     folder.mkdir(parents=True, exist_ok=True)
-    _write(folder / "precision_recall.svg", precision_recall_svg(result))
-    _write(folder / "reliability.svg", reliability_svg(result))
-
-
-def _write(path: Path, text: str) -> None:
-    from reach.errors import InvalidInputError
-
-    try:
-        path.write_text(text, encoding="utf-8")
-    except OSError as error:
-        raise InvalidInputError(f"cannot write {path}: {error}") from error
+    write_text(folder / "precision_recall.svg", precision_recall_svg(result))
+    write_text(folder / "reliability.svg", reliability_svg(result))

@@ -143,10 +143,18 @@ BASE_COLUMNS: tuple[Column, ...] = (
         nullable=True,
     ),
     Column(
-        "T_world_object_true",
-        "numbers",
-        "true pose of the object, known of a simulation only, 4x4 row-major",
-        lambda t: _flat(t.execution.T_world_object_true),
+        "registration_rotation_error",
+        "number",
+        "true error of the registered pose up to symmetry, known of a simulation only",
+        lambda t: t.execution.rotation_error,
+        "rad",
+        nullable=True,
+    ),
+    Column(
+        "registration_translation_error",
+        "number",
+        "true error of the registered pose up to symmetry, known of a simulation only",
+        lambda t: t.execution.translation_error,
         "m",
         nullable=True,
     ),
@@ -244,7 +252,8 @@ def trial_of_row(row: dict[str, Any], models: Iterable[str]) -> LabeledTrial:
         jaw_force=row["jaw_force"],
         sensor_verdict=row["sensor_verdict"],
         time_ns=row["executed_time_ns"],
-        T_world_object_true=_matrix(row["T_world_object_true"], 4),
+        rotation_error=row["registration_rotation_error"],
+        translation_error=row["registration_translation_error"],
     )
     return LabeledTrial(
         trial_id=row["trial_id"],

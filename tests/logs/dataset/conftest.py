@@ -78,6 +78,8 @@ def build_dataset(objects=3, grasps=4, repeats=2, seed=0, faces=12, simulated=Tr
                             T_object_gripper=T_object_gripper,
                             jaw_width=0.021 if lifted else None,
                             jaw_force=19.5,
+                            translation_error=1e-4 * number,
+                            rotation_error=1e-3,
                             sensor_verdict="held" if lifted else "empty",
                             time_ns=1_700_000_000_000_000_000 + 10 * number,
                         )
