@@ -5,14 +5,20 @@ from __future__ import annotations
 import importlib.util
 import threading
 from collections.abc import Callable, Iterator
+from contextlib import ExitStack
 from pathlib import Path
 from types import ModuleType
 from typing import Any
 
+import httpx
 import pytest
 
+from labeling.access import make_access
 from labeling.commands import Actor, Answer, Command, CommandKind
+from labeling.console import Console
 from labeling.controller import SessionController
+from labeling.pictures import PictureShelf
+from labeling.server import ConsoleServer, free_port
 from labeling.take import Take
 from logs.events import Phase, SensorVerdict, Source
 from logs.session import SessionDescriptor, SessionFolder, open_segment
@@ -156,3 +162,41 @@ def in_thread() -> Iterator[Callable[[Callable[[], Any]], Callable[[], Any]]]:
     yield start
     for thread in threads:
         thread.join(10)
+
+
+TOKEN = "t" * 24
+
+
+@pytest.fixture
+def serve() -> Iterator[Callable[..., ConsoleServer]]:
+    """Start a console's server; options are those of Console."""
+    with ExitStack() as stack:
+
+        def start(bench: Bench, **options: Any) -> ConsoleServer:
+            root = bench.folder.path
+            settings: dict[str, Any] = {
+                "pictures": PictureShelf(root),
+                "root": root,
+                "hold_without_console": False,
+                **options,
+            }
+            console = Console(bench.controller, settings.pop("actor", ANN), "monday", **settings)
+            access = make_access("127.0.0.1", free_port(), token=TOKEN)
+            return stack.enter_context(ConsoleServer(console, access))
+
+        yield start
+
+
+@pytest.fixture
+def client_of() -> Iterator[Callable[..., httpx.Client]]:
+    """A client of a server, with the token."""
+    with ExitStack() as stack:
+
+        def make(server: ConsoleServer) -> httpx.Client:
+            headers = {"Authorization": f"Bearer {TOKEN}"}
+            client = httpx.Client(
+                base_url=server.access.origin, headers=headers, timeout=20, trust_env=False
+            )
+            return stack.enter_context(client)
+
+        yield make
