@@ -1,1 +1,40 @@
-"""The driver of a real ABB YuMi with an IRC5 controller."""
+"""The driver of a real ABB YuMi with an IRC5 controller.
+
+`reach_trials.mod` runs on the controller and serves requests; `program` sends them, `arm` and
+`hand` are the devices a trial sees. `docs/hardware.md` says how to set a controller up.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from collection.robots.yumi.config import YumiConfig
+
+if TYPE_CHECKING:
+    from collection.drivers import BuildContext
+    from collection.robots.planner import ArmPlanner
+    from collection.robots.yumi.arm import YumiRobotArm
+    from collection.robots.yumi.hand import SmartGripper
+
+__all__ = ["YumiConfig", "build"]
+
+
+def build(config: YumiConfig, context: BuildContext) -> tuple[YumiRobotArm, SmartGripper]:
+    """Arm and hand of a station; inert until they are connected."""
+    from collection.robots.yumi.arm import YumiRobotArm
+    from collection.robots.yumi.hand import SmartGripper
+    from collection.robots.yumi.link import ControllerLink
+    from reach.transforms import make_transform, rotation_about
+
+    link = ControllerLink(config, context.clock)
+    gripper = context.station.gripper_geometry()
+    table_height = context.station.workspace.table_height
+    T_world_base = make_transform(rotation_about((0, 0, 1), config.base_yaw), config.base)
+
+    def make_planner() -> ArmPlanner:
+        from collection.robots.planner import ArmPlanner
+        from collection.robots.yumi_arm import yumi_arm
+
+        return ArmPlanner(yumi_arm(config.side), gripper, T_world_base, table_height)
+
+    return YumiRobotArm(link, make_planner, T_world_base), SmartGripper(link, gripper)

@@ -1,0 +1,277 @@
+"""The real arm: motions planned and dry-run here, executed and solved by the controller."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from functools import cached_property
+from typing import TYPE_CHECKING, Self
+
+import numpy as np
+
+from collection.errors import JointLimitError, RobotError
+from collection.robots.protocol import (
+    ArmListener,
+    ArmSample,
+    ArmState,
+    Motion,
+    Path,
+    RobotDescription,
+    Speed,
+    Waypoint,
+)
+from collection.robots.yumi.diagnosis import not_ready
+from collection.robots.yumi.feedback import Feedback
+from collection.robots.yumi.link import ControllerLink
+from collection.robots.yumi.messages import Command, Request
+from collection.robots.yumi.speeds import motion_time, request_speeds
+from collection.robots.yumi_arm import CONTROLLER_ORDER
+from reach.arrays import BoolArray, FloatArray
+from reach.transforms import as_transform, inverse, quat_wxyz_from_rotation
+
+if TYPE_CHECKING:
+    from collection.robots.planner import ArmPlanner, JointPath
+
+HOLDER = "the YuMi arm"
+TIME_FACTOR, TIME_MARGIN = 3.0, 10.0
+"""A motion may take this many times its estimate, and so much more [s]."""
+SAME_START = 0.05
+"""A checked motion is executed from where it was checked, up to the arm's own accuracy [rad]."""
+
+
+class YumiRobotArm:
+    """One arm of a YuMi on an IRC5 controller.
+
+    The computer plans and checks every motion and sends where it ends; the controller's own,
+    calibrated kinematics executes it. What the controller then reports is read back and compared
+    with what was asked.
+
+    Args:
+        link: to the controller; the hand shares it.
+        make_planner: builds the dry run's model of arm and cell, when it is first needed.
+        T_world_base: where the robot stands in the station's world, shape (4, 4).
+    """
+
+    def __init__(
+        self,
+        link: ControllerLink,
+        make_planner: Callable[[], ArmPlanner],
+        T_world_base: FloatArray,
+    ) -> None:
+        self._link = link
+        self._make_planner = make_planner
+        self._T_world_base = as_transform(T_world_base, "T_world_base")
+        self._feedback = Feedback(link, self._T_world_base, lambda q: self._planner.forward(q))
+        self._checked: list[tuple[Waypoint, JointPath]] = []
+
+    @cached_property
+    def _planner(self) -> ArmPlanner:
+        return self._make_planner()
+
+    @property
+    def name(self) -> str:
+        """Of the arm, for logs."""
+        return f"ABB IRB 14000 {self._link.task} at {self._link.config.address}"
+
+    @property
+    def description(self) -> RobotDescription:
+        """Limits and shape; readable while disconnected."""
+        return self._planner.description
+
+    def connect(self) -> None:
+        """Reach the controller and check that it is ready; moves nothing."""
+        self._link.connect(HOLDER)
+
+    def disconnect(self) -> None:
+        """Let go of the controller; allowed at any time, more than once."""
+        self._link.disconnect(HOLDER)
+
+    def __enter__(self) -> Self:
+        self.connect()
+        return self
+
+    def __exit__(self, *exception: object) -> None:
+        self.disconnect()
+
+    def state(self) -> ArmState:
+        """What the controller says of itself; an absent controller is a state, too."""
+        try:
+            state = self._link.state()
+        except RobotError as error:
+            return ArmState(connected=False, motors_on=False, automatic=False, error=str(error))
+        reason = not_ready(state)
+        stopped = None if state.running else "the controller's program is stopped"
+        return ArmState(
+            connected=True,
+            motors_on=state.motors == "motoron",
+            automatic=state.mode == "AUTO",
+            emergency_stop=state.motors.startswith("emergencystop"),
+            error=str(reason) if reason else stopped,
+        )
+
+    def joints(self) -> FloatArray:
+        """Measured joints in kinematic order, shape (7,) [rad]."""
+        self._link.require(HOLDER)
+        return self._feedback.joints()
+
+    def pose(self) -> FloatArray:
+        """T_world_gripper as the controller's own kinematics has it, shape (4, 4)."""
+        self._link.require(HOLDER)
+        return self._feedback.T_world_gripper()
+
+    def move_to_joints(
+        self, joints: FloatArray, *, speed: Speed, on_sample: ArmListener | None = None
+    ) -> Motion:
+        """Move straight in joint space.
+
+        Raises:
+            JointLimitError: a target lies outside its limits; nothing moved.
+            UnsafeMotionError: the way there touches something; nothing moved.
+            StaleReadingError: afterwards the controller does not report these joints.
+        """
+        self._refuse_outside_limits(joints)
+        start = self.joints()
+        self._planner.joint_path(start, np.asarray(joints))
+        T_start, T_end = self._planner.forward(start), self._planner.forward(joints)
+        request = self._request(Command.MOVE_JOINTS, joints, T_end, T_start, start, speed)
+        start_ns = self._link.clock.now_ns()
+        self._execute(request, self._time(T_start, T_end, start, joints, speed), on_sample)
+        reached, T = self._feedback.settle_joints(joints, before=start)
+        return Motion(start_ns, self._link.clock.now_ns(), reached, T)
+
+    def move_to_pose(
+        self,
+        T_world_gripper: FloatArray,
+        *,
+        path: Path = Path.LINEAR,
+        speed: Speed,
+        zone: float = 0.0,
+        guarded: bool = False,
+        on_sample: ArmListener | None = None,
+    ) -> Motion:
+        """Move the gripper's frame to a pose; see the protocol.
+
+        Raises:
+            UnreachableError: here or on the controller no configuration reaches it.
+            CollisionStopError: the arm met resistance; it has stopped and lifted off.
+            StaleReadingError: afterwards the controller does not report this pose.
+        """
+        T_goal = as_transform(T_world_gripper, "T_world_gripper")
+        start = self.joints()
+        T_start, joints = self._planner.forward(start), self._end_joints(T_goal, path, start)
+        linear = path is Path.LINEAR
+        command = Command.MOVE_POSE_LINEAR if linear else Command.MOVE_POSE_JOINT
+        supervision = self._link.config.guarded_percent if guarded else 100.0
+        request = self._request(
+            command, joints, T_goal, T_start, start, speed, 1000 * zone, supervision
+        )
+        start_ns = self._link.clock.now_ns()
+        self._execute(request, self._time(T_start, T_goal, start, joints, speed), on_sample)
+        reached, T = self._feedback.settle_pose(T_goal, stops=zone <= 0, before=start)
+        return Motion(start_ns, self._link.clock.now_ns(), reached, T)
+
+    def home(self, *, speed: Speed, on_sample: ArmListener | None = None) -> Motion:
+        """Move to the home configuration."""
+        return self.move_to_joints(self.description.home, speed=speed, on_sample=on_sample)
+
+    def stop(self) -> None:
+        """Stop any motion now, of both arms; `clear_error` makes the arm follow again.
+
+        Raises:
+            ConnectionLostError: the stop did not reach the controller.
+        """
+        self._link.stop()
+
+    def clear_error(self) -> None:
+        """Acknowledge a stop or error: motors on, program from its start; moves nothing.
+
+        Raises:
+            RobotError: if only a person can clear it (emergency stop, manual mode).
+        """
+        self._link.require(HOLDER)
+        self._link.recover()
+
+    def reachable(self, T_world_gripper: FloatArray) -> BoolArray:
+        """Which gripper poses (N, 4, 4) the arm reaches within its limits, clear of the table."""
+        return self._planner.reachable(T_world_gripper)
+
+    def check(self, waypoints: Sequence[Waypoint]) -> None:
+        """Dry run from the present configuration; the branches found are the ones executed.
+
+        Raises:
+            UnreachableError: a waypoint, or a point of a line to it, is out of reach.
+            UnsafeMotionError: the path touches the table or the robot itself.
+        """
+        paths = self._planner.plan(waypoints, self.joints())
+        self._checked = list(zip(waypoints, paths, strict=True))
+
+    def link_transforms(self, joints: FloatArray) -> Mapping[str, FloatArray]:
+        """Forward kinematics: T_world_link (4, 4) of every link, and `gripper`."""
+        return self._planner.link_transforms(joints)
+
+    def _execute(self, request: Request, estimate: float, on_sample: ArmListener | None) -> None:
+        program = self._link.require(HOLDER)
+        timeout = TIME_FACTOR * estimate + TIME_MARGIN
+        report = None if on_sample is None else lambda: on_sample(self._sample())
+        program.serve(request, timeout=timeout, meanwhile=report)
+
+    def _sample(self) -> ArmSample:
+        joints = self._feedback.joints()
+        return ArmSample(self._link.clock.now_ns(), joints, self._planner.forward(joints))
+
+    def _end_joints(self, T_goal: FloatArray, path: Path, start: FloatArray) -> FloatArray:
+        """Configuration to end a motion in: the checked one, else planned from where the arm is."""
+        for waypoint, checked in self._checked:
+            same_goal = np.array_equal(waypoint.T_world_gripper, T_goal)
+            same_start = np.abs(checked.joints[0] - start).max() < SAME_START
+            if same_goal and waypoint.path is path and same_start:
+                break
+        else:
+            (checked,) = self._planner.plan([Waypoint("goal", T_goal, path)], start)
+        end: FloatArray = checked.joints[-1]
+        return end
+
+    def _request(
+        self,
+        command: Command,
+        joints: FloatArray,
+        T_world_goal: FloatArray,
+        T_start: FloatArray,
+        start: FloatArray,
+        speed: Speed,
+        zone_mm: float = 0.0,
+        supervision: float = 100.0,
+    ) -> Request:
+        T_base_goal = inverse(self._T_world_base) @ T_world_goal
+        speed_mm, turn_deg = request_speeds(
+            T_start, T_world_goal, joints - start, self.description.max_speed, speed
+        )
+        return Request(
+            command,
+            joints_deg=tuple(np.degrees(joints[list(CONTROLLER_ORDER)])),
+            position_mm=tuple(1000 * T_base_goal[:3, 3]),
+            quat_wxyz=tuple(quat_wxyz_from_rotation(T_base_goal[:3, :3])),
+            speed_mm=speed_mm,
+            turn_deg=turn_deg,
+            zone_mm=zone_mm,
+            supervision_percent=supervision,
+        )
+
+    def _time(
+        self,
+        T_start: FloatArray,
+        T_end: FloatArray,
+        start: FloatArray,
+        end: FloatArray,
+        speed: Speed,
+    ) -> float:
+        return max(motion_time(T_start, T_end, end - start, self.description.max_speed, speed))
+
+    def _refuse_outside_limits(self, joints: FloatArray) -> None:
+        about = self.description
+        outside = (joints < about.lower) | (joints > about.upper)
+        if np.any(outside):
+            worst = int(np.argmax(outside))
+            raise JointLimitError(
+                f"{about.joint_names[worst]} at {joints[worst]:.3f} rad is outside"
+                f" {about.lower[worst]:.3f} to {about.upper[worst]:.3f}"
+            )

@@ -1,0 +1,178 @@
+"""Dialogues with the program on the controller: lost lines, time-outs, stops, restarts."""
+
+from __future__ import annotations
+
+import pytest
+from yumi_emulator import Arm, Controller, WebServices
+from yumi_emulator.language import parse_module
+
+from collection.clock import SimulatedClock
+from collection.errors import (
+    ConnectionLostError,
+    MotorsOffError,
+    NotConnectedError,
+    NotInAutoError,
+    Recovery,
+    RobotError,
+    RobotTimeoutError,
+    StoppedError,
+)
+from collection.robots.yumi.arm import YumiRobotArm
+from collection.robots.yumi.config import YumiConfig
+from collection.robots.yumi.hand import SmartGripper
+from collection.robots.yumi.link import ControllerLink
+from collection.robots.yumi.messages import LAST_SEQUENCE, next_sequence
+
+
+@pytest.mark.parametrize("fault", ["drop_before", "drop_after"])
+@pytest.mark.parametrize("nth", [0, 1, 2, 6])
+def test_a_line_lost_once_costs_nothing_and_repeats_nothing(
+    hand: SmartGripper,
+    controller: Controller,
+    services: WebServices,
+    right: Arm,
+    fault: str,
+    nth: int,
+) -> None:
+    """The n-th exchange of a command is cut, before or after it took effect."""
+    services.after_exchanges(nth, lambda: setattr(controller.faults, fault, 1))
+    assert hand.calibrate().width == 0.0
+    assert right.hand.calibrations == 1
+    assert getattr(controller.faults, fault) == 0  # the line was cut indeed
+
+
+def test_a_line_lost_twice_is_an_error_that_asks_for_a_retry(
+    hand: SmartGripper, controller: Controller
+) -> None:
+    controller.faults.deaf = 1000
+    with pytest.raises(ConnectionLostError) as caught:
+        hand.calibrate()
+    assert caught.value.recovery is Recovery.RETRY
+
+
+def test_after_a_lost_line_connecting_again_mends_everything(
+    robot: tuple[YumiRobotArm, SmartGripper], controller: Controller
+) -> None:
+    arm, hand = robot
+    controller.faults.deaf = 1000
+    with pytest.raises(ConnectionLostError):
+        arm.connect()
+    controller.faults.deaf = 0
+    arm.connect()
+    assert hand.calibrate().width == 0.0
+
+
+def test_reconnecting_uses_up_no_session(
+    services: WebServices, config: YumiConfig, clock: SimulatedClock
+) -> None:
+    link = ControllerLink(config, clock)
+    for _ in range(10):
+        link.connect("test")
+        link.disconnect("test")
+    assert len(services.sessions) == 0
+
+
+def test_a_program_that_does_not_answer_is_stopped(
+    hand: SmartGripper, controller: Controller
+) -> None:
+    controller.faults.hang = True
+    with pytest.raises(RobotTimeoutError, match="15"):
+        hand.open()
+    assert not controller.running
+
+
+def test_a_slow_program_is_waited_for(hand: SmartGripper, controller: Controller) -> None:
+    controller.faults.task_delay = 3.0
+    before = controller.time
+    hand.calibrate()
+    assert controller.time - before > 3.0
+
+
+@pytest.mark.parametrize(
+    ("mode", "state", "error"),
+    [
+        ("MANR", "motoron", NotInAutoError),
+        ("AUTO", "motoroff", MotorsOffError),
+        ("AUTO", "guardstop", MotorsOffError),
+    ],
+)
+def test_a_controller_that_is_not_ready_is_not_connected(
+    config: YumiConfig,
+    clock: SimulatedClock,
+    controller: Controller,
+    services: WebServices,
+    mode: str,
+    state: str,
+    error: type[RobotError],
+) -> None:
+    controller.mode, controller.state = mode, state
+    link = ControllerLink(config, clock)
+    with pytest.raises(error):
+        link.connect("test")
+    assert not link.held_by("test") and not services.sessions
+
+
+def test_connecting_starts_a_program_that_rests(
+    config: YumiConfig, clock: SimulatedClock, controller: Controller
+) -> None:
+    controller.stop()
+    link = ControllerLink(config, clock)
+    link.connect("test")
+    assert controller.running
+    link.disconnect("test")
+
+
+def test_a_module_of_another_version_is_refused(
+    config: YumiConfig, clock: SimulatedClock, controller: Controller
+) -> None:
+    controller.write("T_ROB_R", "reach_version", '"0"')
+    with pytest.raises(RobotError, match="version 0.*load the new one"):
+        ControllerLink(config, clock).connect("test")
+
+
+def test_a_task_without_our_module_is_named(clock: SimulatedClock) -> None:
+    other = "MODULE Other PROC main() WHILE TRUE DO WaitTime 1; ENDWHILE ENDPROC ENDMODULE"
+    with WebServices(Controller(parse_module(other))) as services:
+        config = YumiConfig(driver="yumi", address=services.address)
+        with pytest.raises(RobotError, match=r"reach_trials\.mod is not loaded in T_ROB_R"):
+            ControllerLink(config, clock).connect("test")
+
+
+def test_an_arm_the_controller_does_not_have_is_named(
+    clock: SimulatedClock, services: WebServices, controller: Controller
+) -> None:
+    del controller.arms["T_ROB_L"]
+    config = YumiConfig(driver="yumi", address=services.address, side="left")
+    with pytest.raises(RobotError, match="no motion task T_ROB_L; it has: T_ROB_R"):
+        ControllerLink(config, clock).connect("test")
+
+
+def test_a_wrong_password_is_said(clock: SimulatedClock, services: WebServices) -> None:
+    config = YumiConfig(driver="yumi", address=services.address, password="guess")
+    with pytest.raises(RobotError, match="401"):
+        ControllerLink(config, clock).connect("test")
+
+
+def test_nobody_there_is_a_lost_connection(clock: SimulatedClock) -> None:
+    config = YumiConfig(driver="yumi", address="127.0.0.1:9", request_timeout=0.5)
+    with pytest.raises(ConnectionLostError, match="127.0.0.1:9"):
+        ControllerLink(config, clock).connect("test")
+
+
+def test_commands_before_connecting_are_refused(config: YumiConfig, clock: SimulatedClock) -> None:
+    with pytest.raises(NotConnectedError):
+        SmartGripper(ControllerLink(config, clock), None).read()  # type: ignore[arg-type]
+
+
+def test_a_program_stopped_at_the_pendant_is_said(
+    hand: SmartGripper, controller: Controller
+) -> None:
+    controller.stop()
+    with pytest.raises(StoppedError, match="was stopped"):
+        hand.read()
+
+
+def test_sequence_numbers_stay_exact_in_single_precision() -> None:
+    assert next_sequence(0) == 1
+    assert next_sequence(LAST_SEQUENCE) == 1
+    assert LAST_SEQUENCE < 2**23
