@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 SUCCESS_RULE = (
     "Success: clear of the table by 50 mm and still held after 1 s; turning in the grasp counts as "
-    "success and is marked `rotated`."
+    "success and is marked rotated."
 )
 """The rule of this project's own trials."""
 

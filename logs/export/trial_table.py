@@ -55,7 +55,7 @@ def read_parquet(path: Path) -> tuple[LabeledTrial, ...]:
     import pyarrow.parquet as pq
 
     try:
-        rows = pq.read_table(path).to_pylist()
+        rows = pq.ParquetFile(path).read().to_pylist()  # read_table loads pandas first
     except (OSError, pa.ArrowInvalid) as error:
         raise DatasetError(f"cannot read {path}: {error}") from error
     return _trials(rows, path)

@@ -9,7 +9,7 @@ from typing import Any
 
 _INK = "#010203"
 """Drawn with, then replaced by the page's text color."""
-STYLE: dict[str, Any] = {
+STYLE: Any = {
     "svg.fonttype": "none",
     "font.family": "sans-serif",
     "font.size": 10.0,

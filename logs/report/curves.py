@@ -59,7 +59,8 @@ def reliability_bins(
     hits = np.bincount(index, outcomes.successes, bins)
     weighted = np.bincount(index, scores * outcomes.trials, bins)
     some = trials > 0
-    return weighted[some] / trials[some], hits[some] / trials[some], trials[some]
+    mean, rate = weighted[some] / trials[some], hits[some] / trials[some]
+    return mean, rate, trials[some].astype(float)
 
 
 def reliability_svg(result: Evaluation, name: str = "calibration") -> str:
@@ -73,10 +74,10 @@ def reliability_svg(result: Evaluation, name: str = "calibration") -> str:
                 continue
             score, rate, trials = reliability_bins(everything, row.scores)
             color = color_of(row.name)
-            faint = 1.0 if row.name.endswith("-robust") else 0.45
-            axes.plot(
-                score, rate, color=color, linewidth=1.2, linestyle=dashes_of(row.name), alpha=faint
-            )
+            graded = len(score) > 2  # a yes or no model has two points and no curve
+            faint = 1.0 if graded else 0.45
+            if graded:
+                axes.plot(score, rate, color=color, linewidth=1.2, linestyle=dashes_of(row.name))
             axes.scatter(score, rate, s=8 + 130 * trials / largest, color=color, alpha=faint, lw=0)
         axes.set(
             xlim=(-0.03, 1.03), ylim=(-0.03, 1.03), xlabel="score", ylabel="share of trials lifted"

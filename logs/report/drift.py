@@ -54,7 +54,7 @@ def measure_drift(dataset: Dataset) -> Drift | None:
 
 def drift_svg(drift: Drift, name: str = "drift") -> str:
     """Three panels: success, tilt, height."""
-    at = np.arange(1, len(drift.success) + 1)
+    at = np.arange(1.0, len(drift.success) + 1)
     with figure((10.0, 2.5), panels=3) as (canvas, (first, second, third)):
         window = max(5, len(at) // 8)
         first.plot(at, _running_mean(drift.success, window), color=MODEL_COLORS["reach"], lw=1.6)

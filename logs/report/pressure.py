@@ -82,7 +82,7 @@ def pressure_svg(found: PressureComparison, name: str = "pressure") -> str:
         left.set_ylabel("pad x, toward the tip [mm]")
         triangles, pressures = _refined(found.triangles, found.pressures)
         shades = PolyCollection(
-            triangles[..., ::-1] * 1e3,
+            list(triangles[..., ::-1] * 1e3),
             array=pressures / 1e3,
             cmap="viridis",
             edgecolor="face",

@@ -120,8 +120,8 @@ class ReliabilityPaint:
     def __call__(self, points: FloatArray, normals: FloatArray) -> FloatArray:
         """Colors (N, 3) of points (N, 3) with outward normals (N, 3), object frame."""
         neighbors = min(12, len(self._points))
-        distance, index = self._tree.query(points, k=neighbors)
-        distance, index = distance.reshape(len(points), -1), index.reshape(len(points), -1)
+        nearest = range(1, neighbors + 1)  # a list of ranks: the answer always has two axes
+        distance, index = map(np.asarray, self._tree.query(points, k=list(nearest)))
         facing = np.einsum("nkj,nj->nk", self._normals[index], normals)
         weight = np.exp(-0.5 * (distance / SPREAD) ** 2) * (facing > 0.6)
         total = weight.sum(axis=1)

@@ -210,7 +210,9 @@ def _layer(
         if callable(solid.color)
         else np.broadcast_to(solid.color, points.shape)
     )
-    color[hit] = base * _light(normals, ahead, up)[:, None]
+    light = _light(normals, ahead, up)[:, None]
+    # Colors that carry meaning keep most of their brightness in the shade.
+    color[hit] = base * (0.55 + 0.45 * light if callable(solid.color) else light)
     return color, depth
 
 

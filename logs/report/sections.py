@@ -66,7 +66,9 @@ def comparison(result: Evaluation) -> list[dict[str, Any]]:
                 key: {
                     "value": row.mean[key],
                     "interval": row.intervals[key],
-                    "best": row.name == top,
+                    "best": row.name not in REFERENCE_NAMES
+                    and top is not None
+                    and _rounded(row, key) == top,
                 }
                 for key, top in best.items()
             },
@@ -173,17 +175,18 @@ def _card(result: Evaluation, index: int) -> dict[str, Any]:
     }
 
 
-def _best(result: Evaluation, key: str, *, smallest: bool) -> str:
-    """Name of the best model of a column; references do not compete."""
-    rows = [
-        (row.mean[key], row.name)
-        for row in result.rows
-        if row.name not in REFERENCE_NAMES and row.mean[key] is not None
-    ]
-    if not rows:
-        return ""
-    pick = min if smallest else max
-    return pick(rows, key=lambda pair: pair[0] or 0.0)[1]
+def _best(result: Evaluation, key: str, *, smallest: bool) -> float | None:
+    """The best value of a column as it is shown; references do not compete."""
+    values = [_rounded(row, key) for row in result.rows if row.name not in REFERENCE_NAMES]
+    known = [value for value in values if value is not None]
+    if not known:
+        return None
+    return min(known) if smallest else max(known)
+
+
+def _rounded(row: ModelRow, key: str) -> float | None:
+    value = row.mean[key]
+    return None if value is None else round(value, 2)
 
 
 def _counts(values: Any) -> list[tuple[str, int]]:

@@ -17,6 +17,7 @@ if TYPE_CHECKING:
 
 PAD_COLOR = (0.15, 0.39, 0.92)
 PAD_OPACITY = 0.55
+GRASP_ELEVATION = np.radians(35.0)
 
 
 def object_picture(dataset: Dataset, name: str) -> str:
@@ -37,7 +38,9 @@ def grasp_picture(case: GraspCase) -> str:
     width = closed_width(scene.object, scene.gripper, grasp.T_object_gripper, grasp.opening)
     pads = _pads(case, scene.gripper.max_opening if width is None else width)
     focus = np.concatenate([part.vertices, *(pad.vertices for pad in pads)])
-    return data_uri(render([part, *pads], focus=focus, azimuth=_sideways(case)))
+    return data_uri(
+        render([part, *pads], focus=focus, azimuth=_sideways(case), elevation=GRASP_ELEVATION)
+    )
 
 
 def _pads(case: GraspCase, opening: float) -> list[Solid]:
@@ -57,11 +60,11 @@ def _pads(case: GraspCase, opening: float) -> list[Solid]:
 
 
 def _sideways(case: GraspCase) -> float:
-    """A camera direction that sees the pads from the side: 60 degrees off the closing axis."""
+    """A camera direction that sees the pads from the side: 75 degrees off the closing axis."""
     T_world_gripper = case.scene.T_world_object @ case.grasp.T_object_gripper
     closing = T_world_gripper[:2, 0]
     if np.linalg.norm(closing) < 0.2:
         return float(np.radians(-55))
     angle = np.arctan2(closing[1], closing[0])
-    options = [angle + np.radians(60) * side + np.pi * flip for side in (1, -1) for flip in (0, 1)]
+    options = [angle + np.radians(75) * side + np.pi * flip for side in (1, -1) for flip in (0, 1)]
     return float(min(options, key=lambda a: abs(np.angle(np.exp(1j * (a - np.radians(-55)))))))
