@@ -35,7 +35,7 @@ def _rotated_form(T: FloatArray, i: int, j: int, m: FloatArray, group: int) -> f
     x = T[j, 0] * m[group, 13] + T[j, 1] * m[group, 16] + T[j, 2] * m[group, 17]
     y = T[j, 0] * m[group, 16] + T[j, 1] * m[group, 14] + T[j, 2] * m[group, 18]
     z = T[j, 0] * m[group, 17] + T[j, 1] * m[group, 18] + T[j, 2] * m[group, 15]
-    return T[i, 0] * x + T[i, 1] * y + T[i, 2] * z
+    return float(T[i, 0] * x + T[i, 1] * y + T[i, 2] * z)
 
 
 @compiled

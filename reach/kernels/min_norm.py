@@ -17,6 +17,12 @@ from reach.kernels.support import support
 MOST_POINTS = 7
 """A point of a set in six dimensions is a combination of at most seven of its points."""
 
+MOST_STALLS = 8
+"""Steps without progress after which rounding is taken to allow no better answer."""
+SMALLEST = 1e-3
+"""A ray that leaves the set before this point is said to leave it at the origin; the iteration would
+only approach that answer."""
+
 
 @compiled
 def affine_weights(
@@ -161,7 +167,7 @@ def exit_of_ray(
     ray_length = np.sqrt(ray_length)
     if ray_length == 0.0:
         return farthest, 0
-    s = farthest
+    s, nearest, stalled = farthest, np.inf, 0
     points[0] = 0.0  # every contact may rest: the origin belongs to Lambda
     convex[0] = 1.0
     count = 1
@@ -178,6 +184,10 @@ def exit_of_ray(
         distance = np.sqrt(distance)
         if distance <= tolerance * s * ray_length:
             return s, step
+        stalled = stalled + 1 if distance > nearest * (1.0 - 1e-9) else 0
+        if stalled > MOST_STALLS:
+            return s, step
+        nearest = min(nearest, distance)
         along = 0.0
         for i in range(dimensions):
             d[i] = -x[i] / distance
@@ -186,8 +196,8 @@ def exit_of_ray(
         for i in range(dimensions, 6):
             new[i] = 0.0
         if along > 0.0 and value < s * along:
-            s = value / along
-            if s < 1e-6:
+            s, nearest = value / along, np.inf
+            if s < SMALLEST:
                 return 0.0, step
             for i in range(dimensions):
                 target[i] = s * ray[i]

@@ -36,7 +36,7 @@ def node_in_prism(
     extent = abs(T[0, 2]) * hx + abs(T[1, 2]) * hy + abs(T[2, 2]) * hz
     if z - extent > high or z + extent < low:
         return NEVER
-    least = z - extent
+    least = float(z - extent)
     x = T[0, 0] * dx + T[1, 0] * dy + T[2, 0] * dz
     extent = abs(T[0, 0]) * hx + abs(T[1, 0]) * hy + abs(T[2, 0]) * hz
     if x - extent > pad_box[1] or x + extent < pad_box[0]:

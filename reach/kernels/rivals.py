@@ -164,7 +164,10 @@ def judge_point_contacts(
 def fit_ellipse(
     count: int, space: Workspace, center: FloatArray, normal: FloatArray
 ) -> tuple[float, float]:
-    """Area and geometric-mean semi-axis of the ellipse with a patch's second moments of area.
+    """Area and geometric-mean semi-axis of the ellipse with a patch's second moments.
+
+    Surface counts by its footprint on the pad, so that a wall almost parallel to the closing
+    direction, which carries no pressure, does not tip the mean normal.
 
     Args:
         count: number of triangles.
@@ -177,7 +180,7 @@ def fit_ellipse(
         perpendicular to the mean normal.
     """
     t = space.triangles
-    area = 0.0
+    area, footprint = 0.0, 0.0
     second = np.zeros((3, 3))
     center[:] = 0.0
     normal[:] = 0.0
@@ -187,6 +190,8 @@ def fit_ellipse(
         ex, ey, ez = uy * vz - uz * vy, uz * vx - ux * vz, ux * vy - uy * vx
         share = 0.5 * np.sqrt(ex * ex + ey * ey + ez * ez)
         area += share
+        share *= space.normals[k, 2]
+        footprint += share
         for i in range(3):
             si = t[k, 0, i] + t[k, 1, i] + t[k, 2, i]
             center[i] += share * si / 3.0
@@ -200,11 +205,11 @@ def fit_ellipse(
         return 0.0, 0.0
     size = np.sqrt(normal[0] ** 2 + normal[1] ** 2 + normal[2] ** 2)
     for i in range(3):
-        center[i] /= area
+        center[i] /= footprint
         normal[i] /= size
     for i in range(3):
         for j in range(3):
-            second[i, j] = second[i, j] / area - center[i] * center[j]
+            second[i, j] = second[i, j] / footprint - center[i] * center[j]
     # The product of the two variances in the plane is n' adj(C) n for the covariance C.
     product = 0.0
     for i in range(3):

@@ -70,7 +70,8 @@ def build_tree(corners: FloatArray, inward: FloatArray) -> MeshTree:
 
 
 def _segments(count: int, level: int) -> IntArray:
-    return (np.arange(2**level + 1, dtype=np.int64) * count) // 2**level
+    starts: IntArray = (np.arange(2**level + 1, dtype=np.int64) * count) // 2**level
+    return starts
 
 
 def _boxes(corners: FloatArray, starts: IntArray) -> FloatArray:

@@ -125,6 +125,17 @@ def check_batch(
     )
 
 
+def _checked_already(scene: Scene, grasp: Grasp, friction: float) -> BatchInput:
+    """Return the batch of one grasp: its values were checked when they were made."""
+    return BatchInput(
+        grasp.T_object_gripper[None],
+        (scene.object.mass * (scene.T_world_object[:3, :3].T @ GRAVITY))[None],
+        scene.object.com[None],
+        np.array([grasp.force]),
+        np.array([friction]),
+    )
+
+
 def as_transforms(value: ArrayLike) -> FloatArray:
     """Check a stack of rigid transforms (N, 4, 4).
 
@@ -196,9 +207,7 @@ class CompiledModel(ABC):
 
     def evaluate(self, scene: Scene, grasp: Grasp) -> Verdict:
         """Judge one grasp."""
-        batch = check_batch(
-            scene, grasp.T_object_gripper, force=grasp.force, friction=self.friction
-        )
+        batch = _checked_already(scene, grasp, self.friction)
         verdicts = self._run(scene, batch, pads_of(scene.gripper, grasp.opening), None)
         return verdicts.verdict(0, lambda: self._patches(scene, grasp))
 
