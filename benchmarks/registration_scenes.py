@@ -32,7 +32,8 @@ class SceneSettings:
 
     Args:
         sensor: a key of CAMERAS.
-        offset: largest distance of the part from the image's middle along x and y [m].
+        offset: largest distance of the part from the table's middle along x and y [m].
+        aim: where on the table the image's middle is, in the camera's right and back, (2,) [m].
         table_tilt: angle between the real table and the world's horizontal [rad].
         calibration_error: translation error of the camera's pose as known [m].
         others: further parts on the table: pose in world, shape (4, 4).
@@ -41,6 +42,7 @@ class SceneSettings:
 
     sensor: str = "structured-light"
     offset: float = 0.02
+    aim: tuple[float, float] = (0.0, 0.0)
     table_tilt: float = 0.0
     calibration_error: float = 0.0
     others: Sequence[tuple[GraspObject, FloatArray]] = field(default=())
@@ -65,12 +67,12 @@ def make_case(
 ) -> RegistrationCase:
     """Put a part (or none) on a table at a random place and look at it obliquely."""
     T_world_table = make_transform(rotation_about(_horizontal(rng), settings.table_tilt))
-    T_world_camera = _camera_pose(rng)
+    T_world_camera = _camera_pose(rng, settings.aim)
     solids = list(settings.others)
     T_world_object, chosen = make_transform(), 0
     if obj is not None:
         chosen, T_table_object = _placement(obj, rng, settings, stable_pose)
-        T_world_object = make_transform(None) @ T_world_table @ T_table_object
+        T_world_object = T_world_table @ T_table_object
         solids.append((obj, T_world_object))
     depth = _capture(solids, T_world_table, T_world_camera, settings, rng)
     error = np.concatenate([np.zeros(3), settings.calibration_error * _direction(rng)])
@@ -116,8 +118,8 @@ def _placement(
     return index, T @ poses[index].T_world_object
 
 
-def _camera_pose(rng: np.random.Generator) -> FloatArray:
-    """Camera 0.6 m from the table's middle, 35 to 65 degrees above it, looking at it."""
+def _camera_pose(rng: np.random.Generator, aim: tuple[float, float]) -> FloatArray:
+    """Camera 0.6 m from the point it aims at, looking 35 to 65 degrees down."""
     azimuth, elevation = rng.uniform(0, 2 * np.pi), np.radians(rng.uniform(35, 65))
     back = np.array(
         [
@@ -129,7 +131,9 @@ def _camera_pose(rng: np.random.Generator) -> FloatArray:
     z = -back
     x = np.cross(z, (0, 0, 1.0))
     x /= np.linalg.norm(x)
-    return make_transform(np.column_stack([x, np.cross(z, x), z]), back * rng.uniform(0.55, 0.65))
+    target = aim[0] * x + aim[1] * np.cross((0, 0, 1.0), x)
+    at = target + back * rng.uniform(0.55, 0.65)
+    return make_transform(np.column_stack([x, np.cross(z, x), z]), at)
 
 
 def _capture(

@@ -57,7 +57,7 @@ def decide(job: Job, found: Sequence[Hypothesis], declared: int | None) -> Decis
             chosen = champion
         else:
             contradicts = True
-    rivals = _rivals(job, chosen, near)
+    rivals = _rivals(job, chosen, found)
     margin = min((m for _, m in rivals), default=1.0)
     return Decision(chosen, margin, tuple(rivals[:MOST_RIVALS]), contradicts)
 
@@ -84,13 +84,20 @@ def _winner(job: Job, near: Sequence[Hypothesis]) -> Hypothesis:
 
 
 def _rivals(
-    job: Job, chosen: Hypothesis, near: Sequence[Hypothesis]
+    job: Job, chosen: Hypothesis, found: Sequence[Hypothesis]
 ) -> list[tuple[Hypothesis, float]]:
-    distinct = [h for h in near if h is not chosen and _differ(job, chosen, h)]
-    here = [h for h in distinct if h.search is chosen.search]
+    near = [h for h in found if h.cost <= chosen.cost + CLEARLY_WORSE]
+    here = [h for h in near if h.search is chosen.search and _differ(job, chosen, h)]
     rated = list(zip(here, map(float, _margins(job, chosen, here)), strict=True))
-    # A pose that explains another thing on the table: there are no pixels in common to ask.
-    rated += [(h, (h.cost - chosen.cost) / CLEARLY_WORSE) for h in distinct if h not in here]
+    # Another thing on the table that the part explains as well: which one is meant, no pixel
+    # can tell.
+    rated += [
+        (h, 0.0)
+        for h in found
+        if h.search is not chosen.search
+        and h.cost <= job.profile.max_cost
+        and _differ(job, chosen, h)
+    ]
     return sorted(rated, key=lambda pair: pair[1])
 
 

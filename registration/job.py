@@ -13,7 +13,7 @@ from reach.stable_poses import StablePose, stable_poses
 from reach.symmetry import symmetry
 from registration.frame import DepthFrame
 from registration.mesh_model import mesh_model
-from registration.observation import scan
+from registration.observation import Scan, scan
 from registration.options import RegistrationOptions
 from registration.search import Hypothesis, Search
 from registration.table import fit_table
@@ -54,7 +54,7 @@ class Job:
             self.scan = scan(
                 frame, self.table, model=self.model, profile=self.profile, options=options
             )
-            self.groups = self._searches(self.scan.groups())
+            self.groups = self._searches(self.scan, self.scan.groups())
 
     @contextmanager
     def timed(self, stage: str) -> Iterator[None]:
@@ -69,10 +69,28 @@ class Job:
         """Search stable poses over all groups of components, by rising cost."""
         return self._run(self.groups, lambda search: search.on_table(poses), stage)
 
-    def single_components(self, stage: str) -> list[Hypothesis]:
-        """Search all stable poses over components one by one: two parts may stand together."""
-        singles = self._searches(self.scan.singles())
-        return self._run(singles, lambda search: search.on_table(self.poses), stage)
+    def parted_components(self, stage: str) -> list[Hypothesis]:
+        """Search all stable poses over parts of what seemed to be one thing.
+
+        Two parts may stand together, or a hand may hide a corner: first each component alone,
+        then, if that explains nothing, components parted where the depth jumps.
+        """
+        with self.timed(stage):
+            searches = self._searches(self.scan, self.scan.singles())
+        found = self._run(searches, lambda search: search.on_table(self.poses), stage)
+        if any(hypothesis.cost <= self.profile.max_cost for hypothesis in found):
+            return found
+        with self.timed(stage):
+            parted = scan(
+                self.frame,
+                self.table,
+                model=self.model,
+                profile=self.profile,
+                options=self.options,
+                split=True,
+            )
+            searches = self._searches(parted, parted.subsets())
+        return found + self._run(searches, lambda search: search.on_table(self.poses), stage)
 
     def anywhere(self, stage: str) -> list[Hypothesis]:
         """Search all orientations over all groups of components, by rising cost."""
@@ -88,8 +106,8 @@ class Job:
             found = [hypothesis for search in searches for hypothesis in how(search)]
         return sorted(found, key=lambda hypothesis: hypothesis.cost)
 
-    def _searches(self, groups: Sequence[tuple[int, ...]]) -> list[Search]:
+    def _searches(self, divided: Scan, groups: Sequence[tuple[int, ...]]) -> list[Search]:
         return [
-            Search(self.model, self.scan.observation(group), self.profile, self.table.noise)
+            Search(self.model, divided.observation(group), self.profile, self.table.noise)
             for group in groups
         ]

@@ -95,6 +95,17 @@ class Scan:
             (i,) for i in range(min(MAX_GROUPS, len(self.components))) if (i,) not in known
         )
 
+    def subsets(self) -> tuple[tuple[int, ...], ...]:
+        """All components but one, for each, and each alone: what if one is not the part's?"""
+        count = min(MAX_GROUPS + 1, len(self.components))
+        if count == 1:
+            return ((0,),)
+        all_but: list[tuple[int, ...]] = [
+            tuple(j for j in range(count) if j != i) for i in range(count)
+        ]
+        alone: list[tuple[int, ...]] = [(i,) for i in range(count)]
+        return tuple(dict.fromkeys(all_but + alone))
+
     def observation(self, group: tuple[int, ...]) -> Observation:
         """The window around one group of components; all others are foreign to it."""
         points = np.concatenate([self.components[i] for i in group])
@@ -140,6 +151,7 @@ def scan(
     model: MeshModel,
     profile: SensorProfile,
     options: RegistrationOptions,
+    split: bool = False,
 ) -> Scan:
     """Cut the table away and find what stands on it.
 
@@ -149,6 +161,7 @@ def scan(
         model: of the part.
         profile: of the sensor.
         options: of the registration.
+        split: also part components where the depth jumps, as between a hand and what it hides.
 
     Raises:
         TooFewPointsError: nothing large enough stands on the table.
@@ -158,17 +171,26 @@ def scan(
     with np.errstate(invalid="ignore"):
         above = heights > cut
         too_high = heights > model.obj.diameter + 5e-3 + 4 * table.noise
-    foreign = _foreign(frame, above, too_high, 4e-3 + 4 * table.noise)
-    labels, count = _connected(above & ~foreign, options.min_points)
-    labels[foreign] = FOREIGN
+    smooth = _smooth(frame, above, 4e-3 + 4 * table.noise)
+    foreign = _foreign(above, smooth, too_high)
+    mask = above & ~foreign
+    labels, count = _connected(
+        mask & smooth if split else mask, options.min_points, bridge=not split
+    )
+    labels[above & (labels == TABLE)] = FOREIGN
     labels[np.isnan(heights)] = NO_RETURN
-    if count == 0:
+    components = tuple(_points(frame, labels == PART + i) for i in range(count))
+    # Correlated noise raises patches of bare table a little above the cut.
+    if not any(_stands(table, points, cut + 1.5 * table.noise) for points in components):
         raise TooFewPointsError(
             f"nothing stands on the table: no group of {options.min_points} depth points is "
-            f"higher than {cut * 1e3:.1f} mm"
+            f"clearly higher than {cut * 1e3:.1f} mm"
         )
-    components = tuple(_points(frame, labels == PART + i) for i in range(count))
     return Scan(frame, table, labels, components, model.obj.diameter)
+
+
+def _stands(table: Table, points: FloatArray, height: float) -> bool:
+    return float(np.quantile(table.heights(points), 0.9)) > height
 
 
 def table_heights(frame: DepthFrame, table: Table) -> NDArray[np.float32]:
@@ -181,17 +203,22 @@ def table_heights(frame: DepthFrame, table: Table) -> NDArray[np.float32]:
     return height
 
 
-def _foreign(frame: DepthFrame, above: BoolArray, too_high: BoolArray, step: float) -> BoolArray:
+def _smooth(frame: DepthFrame, above: BoolArray, step: float) -> BoolArray:
+    """Pixels above the table whose neighbors above it are at nearly the same depth."""
+    import cv2
+
+    window = np.ones((3, 3), np.uint8)
+    near = cv2.erode(np.where(above, frame.depth, np.float32(1e3)), window)
+    far = cv2.dilate(np.where(above, frame.depth, np.float32(0)), window)
+    return np.asarray(above & (far - near < step))
+
+
+def _foreign(above: BoolArray, smooth: BoolArray, too_high: BoolArray) -> BoolArray:
     """Mark what reaches higher than the part could, with all that hangs on it without a step."""
     if not too_high.any():
         return np.zeros_like(above)
     import cv2
 
-    # A jump in depth of more than `step` between neighbors parts a hand from what it covers.
-    depth = np.where(above, frame.depth, 0).astype(np.float32)
-    near = cv2.erode(np.where(above, depth, np.float32(1e3)), np.ones((3, 3), np.uint8))
-    far = cv2.dilate(depth, np.ones((3, 3), np.uint8))
-    smooth = above & (far - near < step)
     count, parts = cv2.connectedComponents(smooth.astype(np.uint8), connectivity=4)
     hit = np.bincount(parts[too_high & smooth], minlength=count) > 3
     hit[0] = False
@@ -199,12 +226,14 @@ def _foreign(frame: DepthFrame, above: BoolArray, too_high: BoolArray, step: flo
     return np.asarray(above & (grown | too_high))
 
 
-def _connected(mask: BoolArray, min_points: int) -> tuple[NDArray[np.int16], int]:
-    """Number groups of pixels from PART on, largest first; a gap of a pixel does not part them."""
+def _connected(mask: BoolArray, min_points: int, *, bridge: bool) -> tuple[NDArray[np.int16], int]:
+    """Number groups of pixels from PART on, largest first; `bridge` gaps of a pixel."""
     import cv2
 
-    closed = cv2.morphologyEx(mask.astype(np.uint8), cv2.MORPH_CLOSE, np.ones((3, 3), np.uint8))
-    count, parts = cv2.connectedComponents(closed, connectivity=8)
+    image = mask.astype(np.uint8)
+    if bridge:
+        image = cv2.morphologyEx(image, cv2.MORPH_CLOSE, np.ones((3, 3), np.uint8))
+    count, parts = cv2.connectedComponents(image, connectivity=8 if bridge else 4)
     size = np.bincount(parts[mask], minlength=count)
     size[0] = 0
     order = np.argsort(-size, kind="stable")[: 3 * MAX_GROUPS]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Literal, get_args
 
 import numpy as np
@@ -96,9 +97,10 @@ def _search(job: Job, mode: str, declared: int | None) -> list[Hypothesis]:
     elif mode == "any":
         found += job.on_table(job.poses, "search")
     if not _explains(job, found) and mode != "free":
-        found += job.single_components("single components")
+        found += job.parted_components("part components")
     if not _explains(job, found):
-        found += job.anywhere("search" if mode == "free" else "free search")
+        anywhere = job.anywhere("search" if mode == "free" else "free search")
+        found += anywhere if mode == "free" else [_settled(job, h) for h in anywhere]
     found.sort(key=lambda hypothesis: hypothesis.cost)
     if not _explains(job, found):
         raise NoGoodPoseError(
@@ -107,6 +109,16 @@ def _search(job: Job, mode: str, declared: int | None) -> list[Hypothesis]:
             "wrong object, clutter, or a moved camera"
         )
     return found
+
+
+def _settled(job: Job, hypothesis: Hypothesis) -> Hypothesis:
+    """A freely found pose under the name of the stable pose that it is close to."""
+    index, tilt = nearest_stable_pose(
+        hypothesis.T_camera_object, job.table.normal_camera, job.poses, job.sym
+    )
+    if index is None or tilt > job.options.max_tilt:
+        return hypothesis
+    return replace(hypothesis, stable_pose=index)
 
 
 def _explains(job: Job, found: list[Hypothesis]) -> bool:
