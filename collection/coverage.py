@@ -104,7 +104,7 @@ def coverage(
         grasps=len(grasps),
         approach_angle=Histogram.of(np.array([g.approach_angle for g in grasps]), np.pi / 3),
         width=Histogram.of(np.array([g.width for g in grasps]), gripper.max_opening),
-        offset=Histogram.of(np.array(offsets), 0.0),
+        offset=Histogram.of(np.array(offsets), gripper.jaws[0].pad.width),
         contacts=counts,
     )
 

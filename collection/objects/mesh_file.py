@@ -62,7 +62,7 @@ def _joined(part: GraspObject) -> GraspObject:
         raise InvalidMeshError(
             f"mesh {part.name!r} holds {len(pieces)} pieces that do not touch; a part is one piece"
         )
-    mesh = union.to_mesh64()
+    mesh = union.simplify(_WELD).to_mesh64()
     vertices = np.asarray(mesh.vert_properties[:, :3], dtype=float)
     return GraspObject(part.name, vertices, np.asarray(mesh.tri_verts, np.int64), part.mass)
 

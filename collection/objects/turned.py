@@ -36,7 +36,7 @@ def vase() -> Solid:
 def nozzle() -> Solid:
     """A garden-hose nozzle: a hexagonal nut, a flange, a cone with a bore."""
     hexagon = rod(18, 12, 6)
-    body = turned([(0, 8), (15, 12), (15, 16), (11, 18), (9, 34), (5.5, 52), (0, 52)], 56)
+    body = turned([(0, 8), (15, 12), (15, 16), (11, 18), (9, 34), (5.5, 52), (0, 52)], 54)
     return (
         hexagon + body - rod(6, 34, 40, base_mm=(0, 0, -1)) - rod(2.6, 80, 28, base_mm=(0, 0, -1))
     )

@@ -131,10 +131,12 @@ class _Search:
         self.down = -self.T_world_object[2, :3]
         self.center = center_of_pads(gripper)
         self.kept: list[SampledGrasp] = []
+        self.kept_poses: FloatArray = np.empty((0, 4, 4))
         self.discarded: Counter[str] = Counter()
 
     def run(self, count: int, rng: np.random.Generator) -> SampleResult:
         candidates = 0
+        self.kept_poses = np.empty((count, 4, 4))
         while len(self.kept) < count and candidates < self.options.max_candidates:
             self._try_batch(count, rng)
             candidates += self.options.batch
@@ -201,12 +203,12 @@ class _Search:
         return usable
 
     def _keep(self, T: FloatArray, T_parent: FloatArray, contacts: FloatArray) -> None:
-        if self.kept:
-            others = np.array([grasp.T_object_gripper for grasp in self.kept])
-            nearest = grasp_distance(others, T, self.center).min()
-            if nearest <= self.options.min_distance:
-                self.discarded["near-duplicate"] += 1
-                return
+        number = len(self.kept)
+        nearest = grasp_distance(self.kept_poses[:number], T, self.center).min(initial=np.inf)
+        if nearest <= self.options.min_distance:
+            self.discarded["near-duplicate"] += 1
+            return
+        self.kept_poses[number] = T
         self.kept.append(
             SampledGrasp(
                 T,
