@@ -2,18 +2,18 @@
 
 from __future__ import annotations
 
-import os
 from pathlib import Path
 
 import numpy as np
 
 from logs.annotation_files import read_annotations
 from logs.annotations import Annotations
-from logs.errors import ViewError
 from logs.trial_folder import BLIND_VIEW_NAME, VIEW_NAME, annotation_paths
 from logs.trial_record import TrialRecord, read_record, record_path
 
 APPLICATION = "reach-trials trial"
+DEFAULT_EXTENT = (0.03, 0.03, 0.03)
+"""Of an object whose mesh the record lacks [m]."""
 
 
 def derive_rrd(folder: Path, out: Path | None = None, *, blind: bool = False) -> Path:
@@ -32,18 +32,11 @@ def derive_rrd(folder: Path, out: Path | None = None, *, blind: bool = False) ->
         ViewError: if the view cannot be written.
     """
     path = out or view_path(folder, blind=blind)
-    sources = _newest_source(folder)
+    # A view is as old as its newest source: so a copied or relabeled take is seen as such.
+    time_ns = _newest_source(folder)
     record = read_record(folder)
     annotations = Annotations() if blind else read_annotations(folder)
-    temporary = path.with_name(f".{path.name}.{os.getpid()}.part")
-    try:
-        write_view(record, annotations, temporary, blind=blind)
-        # A view is as old as its newest source: so a copied or relabeled take is seen as such.
-        os.utime(temporary, ns=(sources, sources))
-        os.replace(temporary, path)
-    except OSError as error:
-        temporary.unlink(missing_ok=True)
-        raise ViewError(f"cannot write the view {path}: {error}") from error
+    _write(record, annotations, path, time_ns, blind=blind)
     return path
 
 
@@ -65,34 +58,32 @@ def fresh_view(folder: Path, *, blind: bool = False) -> Path:
     return derive_rrd(folder, blind=blind)
 
 
-def write_view(
-    record: TrialRecord, annotations: Annotations, path: Path, *, blind: bool = False
+def _write(
+    record: TrialRecord, annotations: Annotations, path: Path, time_ns: int, *, blind: bool
 ) -> None:
     """Draw a record and its annotations into a file."""
     from logs.blueprint import blind_blueprint, trial_blueprint
     from logs.view_contacts import model_with_contacts, show_contacts
+    from logs.view_file import view_file
     from logs.view_panels import show_panels
     from logs.view_scene import object_triangles, show_scene
     from logs.view_stage import Stage
 
     described = record.descriptor
     scores = annotations.newest_scores
-    triangles = object_triangles(record)
-    diameter = 0.05 if triangles is None else float(np.linalg.norm(np.ptp(triangles, axis=(0, 1))))
-    layout = (
-        blind_blueprint(record)
-        if blind
-        else trial_blueprint(record, model_with_contacts(scores), diameter)
-    )
-    stage = Stage(APPLICATION, f"{described.trial_id}-{described.take}", described.time_ns)
-    try:
-        stage.save(path, layout)
-        stage.recording.send_recording_name(_name(record, annotations))
+    if blind:
+        layout = blind_blueprint(record)
+    else:
+        triangles = object_triangles(record)
+        extent = DEFAULT_EXTENT if triangles is None else np.ptp(triangles, axis=(0, 1))
+        layout = trial_blueprint(record, model_with_contacts(scores), float(np.linalg.norm(extent)))
+    name = f"{described.trial_id}-{described.take}"
+    with view_file(APPLICATION, name, path, layout, time_ns) as recording:
+        recording.send_recording_name(_name(record, annotations))
+        stage = Stage(recording, described.time_ns)
         show_scene(stage, record, blind=blind)
         show_contacts(stage, scores)
         show_panels(stage, record, annotations, blind=blind)
-    finally:
-        stage.close()
 
 
 def _name(record: TrialRecord, annotations: Annotations) -> str:

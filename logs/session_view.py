@@ -8,7 +8,6 @@ right state.
 from __future__ import annotations
 
 import io
-import os
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -42,6 +41,7 @@ from logs.view_contacts import (
     model_with_contacts,
     pressure_rgba,
 )
+from logs.view_file import view_file
 from logs.view_scene import flat_mesh, object_triangles, recorded_gripper, show_fingers
 from logs.view_stage import placed
 from logs.view_text import summary
@@ -69,27 +69,11 @@ def write_session_view(session: Path, out: Path) -> Path:
     shown = overview(list_takes(session))
     if not shown:
         raise ViewError(f"{session} has no executed trial to show yet")
-    temporary = out.with_name(f".{out.name}.{os.getpid()}.part")
-    try:
-        _write(folder, shown, temporary)
-        os.replace(temporary, out)
-    except OSError as error:
-        temporary.unlink(missing_ok=True)
-        raise ViewError(f"cannot write the view {out}: {error}") from error
-    return out
-
-
-def _write(folder: SessionFolder, shown: Sequence[OverviewRow], path: Path) -> None:
-    recording: Any = rr.RecordingStream(APPLICATION, recording_id=folder.descriptor.session_id)
-    recording.set_log_time_enabled(False)
-    recording.set_log_tick_enabled(False)
-    try:
-        layout = session_blueprint(judging_model([item.row for item in shown]))
-        recording.set_sinks(rr.FileSink(str(path)), default_blueprint=layout)
+    layout = session_blueprint(judging_model([item.row for item in shown]))
+    with view_file(APPLICATION, folder.descriptor.session_id, out, layout) as recording:
         recording.send_recording_name(f"all trials of {folder.path.resolve().name}")
         _SessionDrawing(recording, folder, shown).draw()
-    finally:
-        recording.disconnect()
+    return out
 
 
 class _SessionDrawing:

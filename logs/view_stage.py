@@ -1,9 +1,8 @@
-"""Where a view is drawn: a Rerun recording with the trial's clock."""
+"""Where a take's view is drawn: a Rerun recording with the trial's clock."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -19,30 +18,16 @@ CAPTURE_TIME = "capture_time"
 
 
 class Stage:
-    """A recording under construction, in a file.
+    """A recording with the trial's timelines.
 
     Args:
-        application: groups recordings that share a blueprint.
-        recording_id: unique; the same for the same trial.
+        recording: a Rerun recording stream.
         start_ns: zero of the elapsed time [ns].
     """
 
-    def __init__(self, application: str, recording_id: str, start_ns: int) -> None:
-        self.recording: Any = rr.RecordingStream(
-            application, recording_id=recording_id, send_properties=True
-        )
+    def __init__(self, recording: Any, start_ns: int) -> None:
+        self.recording = recording
         self.start_ns = start_ns
-        # Rerun's own clocks say when the view was derived, which nobody asks.
-        self.recording.set_log_time_enabled(False)
-        self.recording.set_log_tick_enabled(False)
-
-    def save(self, path: Path, blueprint: Any) -> None:
-        """Write everything that follows to a file, with its blueprint inside."""
-        self.recording.set_sinks(rr.FileSink(str(path)), default_blueprint=blueprint)
-
-    def close(self) -> None:
-        """Write the file's end."""
-        self.recording.disconnect()
 
     def static(self, entity: str, *shown: Any) -> None:
         """Show something at all times."""

@@ -51,10 +51,17 @@ def kill_trial_four(sessions, made, session: SessionFolder, *, stop: bool) -> Pa
         journal.append(ev.TrialStarted(trial_id=entry.trial_id, take=1))
     folder = session.trial_folder(entry.trial_id)
     with TrialRecorder(folder) as recorder:
-        made.record_trial(recorder, samples=5, number=4, trial_id=entry.trial_id)
-    data = (folder / RECORD_NAME).read_bytes()
-    kept = len(data) - 30 if stop else len(data) // 2
-    (folder / PART_NAME).write_bytes(data[:kept])
+        if stop:
+            made.record_trial(recorder, samples=5, number=4, trial_id=entry.trial_id)
+            data = (folder / RECORD_NAME).read_bytes()[:-30]
+        else:
+            recorder.start(made.descriptor(made.cube(), 4, entry.trial_id))
+            recorder.jaw(1, 0.02)
+            recorder.phase("lift")
+            recorder.flush()
+            data = (folder / PART_NAME).read_bytes()
+            recorder.stop(ExitStatus.SUCCESS)
+    (folder / PART_NAME).write_bytes(data)
     (folder / RECORD_NAME).unlink()
     return folder
 

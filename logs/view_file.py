@@ -1,0 +1,61 @@
+"""A Rerun file that appears whole or not at all."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+from logs.errors import ViewError
+
+_END = b"RRF2FOOT"
+_END_SIZE = len(_END) + 4
+
+
+@contextmanager
+def view_file(
+    application: str, recording_id: str, out: Path, blueprint: Any, time_ns: int | None = None
+) -> Iterator[Any]:
+    """A recording to draw into; at the end of the block it is the file `out`.
+
+    Args:
+        application: groups recordings that share a blueprint.
+        recording_id: unique; the same for the same trial.
+        out: the .rrd file; replaced if it exists.
+        blueprint: stored inside.
+        time_ns: the file's time of change [ns]; now if None.
+
+    Raises:
+        ViewError: if the file cannot be written.
+    """
+    import rerun as rr
+
+    temporary = out.with_name(f".{out.name}.{os.getpid()}.part")
+    recording: Any = rr.RecordingStream(application, recording_id=recording_id)
+    # Rerun's own clocks say when the view was derived, which nobody asks.
+    recording.set_log_time_enabled(False)
+    recording.set_log_tick_enabled(False)
+    try:
+        try:
+            recording.set_sinks(rr.FileSink(str(temporary)), default_blueprint=blueprint)
+            yield recording
+        finally:
+            recording.disconnect()
+        if not _is_whole(temporary):
+            raise ViewError(f"cannot write the view {out}: its end is missing; is the disk full?")
+        if time_ns is not None:
+            os.utime(temporary, ns=(time_ns, time_ns))
+        os.replace(temporary, out)
+    except (OSError, RuntimeError) as error:  # Rerun reports a missing folder as RuntimeError
+        raise ViewError(f"cannot write the view {out}: {error}") from error
+    finally:
+        temporary.unlink(missing_ok=True)
+
+
+def _is_whole(path: Path) -> bool:
+    with path.open("rb") as stream:
+        size = stream.seek(0, os.SEEK_END)
+        stream.seek(max(size - _END_SIZE, 0))
+        return stream.read().startswith(_END)
