@@ -194,14 +194,18 @@ class SessionController:
             self.announce()
             return entry
 
-    def wait_until(self, condition: Callable[[], bool]) -> None:
+    def wait_until(self, condition: Callable[[], bool], timeout: float | None = None) -> None:
         """Wait for the operator.
+
+        Args:
+            condition: what is waited for; looked at after every change.
+            timeout: give up after this many seconds.
 
         Raises:
             SessionEndingError: if the session is asked to end meanwhile.
         """
         with self._changed:
-            self._changed.wait_for(lambda: self._ending or condition())
+            self._changed.wait_for(lambda: self._ending or condition(), timeout)
             if self._ending and not condition():
                 raise SessionEndingError("the session is ending")
 

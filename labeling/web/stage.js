@@ -2,6 +2,8 @@
 
 import { byId } from "/draw.js";
 
+const OVERLAY = "overlay"; // the picture of the pose that was found; any other shows how to place
+
 // The same server under its other name: a page of another site gets a process of its own.
 function viewerOrigin() {
   const host = location.hostname === "127.0.0.1" ? "localhost" : location.hostname;
@@ -23,27 +25,29 @@ export class Stage {
 
   draw(view, trial) {
     const pictures = trial?.pictures ?? [];
-    const placing = pictures.includes("placing") && trial?.phase === "PLACE_OBJECT";
-    this.picture("placing", trial, placing);
+    const howTo = pictures.find((name) => name !== OVERLAY);
+    const placing = Boolean(howTo) && trial?.phase === "PLACE_OBJECT" && view.mode === "run";
+    this.picture("placing", howTo, trial, placing);
     if (view.mode === "review") {
       this.recording(trial);
     } else {
-      const found = pictures.includes("overlay") && ["REGISTER", "CONFIRM_POSE"].includes(trial?.phase);
+      const overlaid = pictures.includes(OVERLAY);
+      const found = overlaid && ["REGISTER", "CONFIRM_POSE"].includes(trial?.phase);
       this.viewer(view.live_view && !found && !placing ? `url=${encodeURIComponent(view.live_view)}` : null);
-      this.picture("overlay", trial, pictures.includes("overlay") && !placing && (found || !view.live_view));
+      this.picture("overlay", OVERLAY, trial, overlaid && !placing && (found || !view.live_view));
     }
     byId("stage-empty").hidden = ["viewer", "overlay", "placing"].some((id) => !byId(id).hidden);
   }
 
-  async picture(name, trial, wanted) {
-    const figure = byId(name);
-    const address = wanted ? `/api/pictures/${encodeURIComponent(trial.trial_id)}/${trial.take}/${name}` : null;
+  async picture(id, name, trial, wanted) {
+    const figure = byId(id);
+    const address = wanted ? `/api/pictures/${encodeURIComponent(trial.trial_id)}/${trial.take}/${encodeURIComponent(name)}` : null;
     const version = wanted ? `${address}?${trial.phase}` : null; // a picture may be drawn anew per phase
     figure.hidden = !wanted;
-    if (this.shown[name] === version) return;
-    this.shown[name] = version;
+    if (this.shown[id] === version) return;
+    this.shown[id] = version;
     const source = address ? await this.link.picture(address) : null;
-    if (this.shown[name] !== version) return;
+    if (this.shown[id] !== version) return;
     const image = figure.querySelector("img");
     if (image.src.startsWith("blob:")) URL.revokeObjectURL(image.src);
     image.src = source ?? "data:,";

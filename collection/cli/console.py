@@ -1,0 +1,25 @@
+"""`reach console`: the terminal console of a session that runs elsewhere."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+
+def console(
+    link: Annotated[str, typer.Argument(help="The link that the session printed.")],
+    certificate: Annotated[
+        Path | None, typer.Option(help="TLS certificate (PEM) of the server to trust.")
+    ] = None,
+) -> None:
+    """Operate a session from a terminal, with the same keys as the page.
+
+    - `reach console 'http://127.0.0.1:8000/#token=...'`
+    """
+    from labeling.terminal import TerminalConsole
+    from labeling.terminal_link import TerminalLink
+
+    verify = str(certificate) if certificate else True
+    TerminalConsole(TerminalLink(link, verify=verify)).run()
