@@ -85,7 +85,7 @@ class SessionFolder:
         Args:
             path: where; nothing may be there yet.
             session: content of session.json.
-            files: further files by name, such as plan.json.
+            files: further files by name, such as plan.json or objects/cube.ply.
 
         Raises:
             SessionExistsError: if something is there.
@@ -224,6 +224,7 @@ def _fill(folder: Path, session: SessionDescriptor, files: Mapping[str, str | by
         JOURNAL_NAME: encode_entry(first),
     }
     for name, content in contents.items():
+        (folder / name).parent.mkdir(exist_ok=True)
         with (folder / name).open("wb") as stream:
             stream.write(content.encode() if isinstance(content, str) else content)
             stream.flush()

@@ -10,7 +10,18 @@ import typer
 
 from reach.errors import ReachError
 
-COMMANDS: dict[str, str] = {}
+COMMANDS: dict[str, str] = {
+    "collect": "collect",
+    "status": "status",
+    "replay": "replay",
+    "recover": "recover",
+    "export": "export",
+    "import": "import_",
+    "evaluate": "evaluate",
+    "register": "register",
+    "sample": "sample",
+    "objects": "objects",
+}
 """Command name -> module in collection.cli that holds a function of the same name."""
 
 

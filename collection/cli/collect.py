@@ -1,0 +1,71 @@
+"""`reach collect`: run a session of grasp trials."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+
+def collect(
+    out: Annotated[Path, typer.Option("--out", help="The session's folder.")],
+    station: Annotated[
+        str | None, typer.Option(help="A packaged station, or a station file. [simulated]")
+    ] = None,
+    objects: Annotated[
+        str | None,
+        typer.Option(help="Built-in names or mesh files, separated by commas; `all`."),
+    ] = None,
+    grasps: Annotated[int | None, typer.Option(help="Grasps an object. [25]")] = None,
+    repeats: Annotated[int | None, typer.Option(help="Trials a grasp. [5]")] = None,
+    operator: Annotated[
+        str | None, typer.Option(help="Who labels: auto, web or terminal. [web]")
+    ] = None,
+    seed: Annotated[int | None, typer.Option(help="Everything random follows from it. [0]")] = None,
+    mesh_unit: Annotated[
+        str | None, typer.Option(help="Unit of mesh files: m, cm, mm or in. [m]")
+    ] = None,
+    resume: Annotated[
+        bool, typer.Option("--resume", help="Continue the session in --out.")
+    ] = False,
+    accept_change: Annotated[
+        str, typer.Option(help="With --resume: calibration, camera, robot, by commas.")
+    ] = "",
+    dry_run: Annotated[
+        bool, typer.Option("--dry-run", help="Print the plan; nothing moves, nothing is written.")
+    ] = False,
+    report: Annotated[bool, typer.Option(help="Write report.html at the end.")] = True,
+    as_json: Annotated[bool, typer.Option("--json", help="Print the summary as JSON.")] = False,
+) -> None:
+    """Run a session of grasp trials.
+
+    A short simulated session, labeled by a simulated operator:
+
+        reach collect --objects cube_3cm,bracket --grasps 5 --repeats 2 --operator auto --out S
+
+    A part of your own, and a person at the page:
+
+        reach collect --station lab.toml --objects part.stl --mesh-unit mm --out S
+
+    After an interruption:
+
+        reach collect --resume --out S
+    """
+    from collection.conduct import Conduct, conduct, show_plan
+
+    chosen = {
+        "station": station,
+        "objects": None if objects is None else tuple(filter(None, objects.split(","))),
+        "grasps": grasps,
+        "repeats": repeats,
+        "operator": operator,
+        "seed": seed,
+        "mesh_unit": mesh_unit,
+    }
+    given = {name: value for name, value in chosen.items() if value is not None}
+    if dry_run:
+        show_plan(given, as_json=as_json)
+        return
+    accepted = tuple(filter(None, accept_change.split(",")))
+    conduct(Conduct(out, given, resume, accepted, report, as_json))

@@ -1,0 +1,312 @@
+"""Conducts a session from the command line: checks, creates or resumes, runs, sums up."""
+
+from __future__ import annotations
+
+import getpass
+import json
+import signal
+import sys
+from collections.abc import Iterator, Mapping
+from contextlib import ExitStack, contextmanager
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from pydantic import ValidationError
+from rich.console import Console
+
+from collection.errors import OptionsError
+from collection.options import SessionOptions
+from collection.setup import (
+    Setup,
+    fingerprints,
+    make_setup,
+    read_setup,
+    same_station,
+)
+from logs.events import Source
+from logs.session import ACCEPTABLE_CHANGES, SessionFolder, open_segment
+from logs.state import SessionState
+from reach.errors import ReachError, UnknownNameError
+
+if TYPE_CHECKING:
+    from collection.progress import SessionProgress
+    from collection.session import Session
+    from collection.station import Station
+    from labeling.controller import SessionController
+
+DEFAULTS: Mapping[str, Any] = {"operator": "web"}
+
+
+@dataclass(frozen=True, slots=True)
+class Conduct:
+    """What `reach collect` was asked.
+
+    Args:
+        out: the session's folder.
+        given: the options that were given, by name.
+        resume: continue the session in `out`.
+        accepted: parts of the set-up that may have changed.
+        report: whether to write the report at the end.
+        as_json: print the summary as JSON, and nothing else, on standard output.
+    """
+
+    out: Path
+    given: Mapping[str, Any]
+    resume: bool
+    accepted: tuple[str, ...]
+    report: bool
+    as_json: bool
+
+
+def conduct(asked: Conduct) -> None:
+    """Run a new session, or the rest of one.
+
+    Raises:
+        ReachError: bad input (nothing was written), or a station that needs a person.
+    """
+    terminal = Console(stderr=asked.as_json)
+    if asked.resume:
+        folder, setup, station = _reopen(asked)
+    else:
+        folder, setup, station = _create(asked, terminal)
+    with station:
+        _run(asked, folder, setup, station, terminal)
+
+
+def show_plan(given: Mapping[str, Any], *, as_json: bool) -> None:
+    """Print what a session would do; nothing moves and nothing is written."""
+    from collection.plan_table import pose_table, trial_table
+
+    options = resolve(given)
+    station = _load(options)
+    with _planning_station(station):
+        setup = make_setup(options, station)
+    if as_json:
+        print(setup.plan.to_json())
+        return
+    terminal = Console()
+    terminal.print(pose_table(setup.plan, setup.objects.values()))
+    terminal.print(trial_table(setup.plan))
+    for part in setup.plan.objects:
+        for note in part.notes:
+            terminal.print(f"{part.name}: {note}", markup=False)
+
+
+def resolve(given: Mapping[str, Any]) -> SessionOptions:
+    """The options with their defaults.
+
+    Raises:
+        OptionsError: a missing or impossible value, named.
+    """
+    if not given.get("objects"):
+        from collection.objects import OBJECT_NAMES
+
+        raise OptionsError(
+            f"--objects is missing: name built-in objects or mesh files, or `all`;"
+            f" built-in: {', '.join(OBJECT_NAMES)}"
+        )
+    try:
+        return SessionOptions(**{**DEFAULTS, **given})
+    except ValidationError as error:
+        first = error.errors()[0]
+        name = str(first["loc"][0]).replace("_", "-")
+        raise OptionsError(f"--{name} {first['input']!r}: {first['msg']}") from error
+
+
+def _create(asked: Conduct, terminal: Console) -> tuple[SessionFolder, Setup, Station]:
+    from logs.errors import SessionExistsError
+
+    options = resolve(asked.given)
+    if asked.accepted:
+        raise OptionsError("--accept-change goes with --resume")
+    if asked.out.exists():
+        raise SessionExistsError(asked.out)
+    station = _load(options)
+    _check_operator(options, station)
+    with terminal.status("planning"), _planning_station(station):
+        setup = make_setup(options, station)
+    folder = SessionFolder.create(asked.out, setup.descriptor(station), setup.files())
+    return folder, setup, station
+
+
+def _reopen(asked: Conduct) -> tuple[SessionFolder, Setup, Station]:
+    folder = SessionFolder.open(asked.out)
+    setup = read_setup(folder)
+    for name in asked.accepted:
+        if name not in ACCEPTABLE_CHANGES:
+            raise UnknownNameError("change", name, ACCEPTABLE_CHANGES)
+    planned = setup.options.model_dump()
+    for name in ("objects", "grasps", "repeats", "seed", "mesh_unit"):
+        if name in asked.given and asked.given[name] != planned[name]:
+            raise OptionsError(
+                f"--{name.replace('_', '-')} {asked.given[name]!r} differs from the session's"
+                f" {planned[name]!r}: a session keeps its plan; start another with --out"
+            )
+    changed = {k: asked.given[k] for k in ("station", "operator") if k in asked.given}
+    options = setup.options.model_copy(update=changed)
+    station = _load(options)
+    same_station(station, setup, asked.out)
+    _check_operator(options, station)
+    return folder, Setup(options, station.text, setup.objects, setup.plan), station
+
+
+def _load(options: SessionOptions) -> Station:
+    from collection.station import load_station
+
+    return load_station(options.station, seed=options.seed)
+
+
+@contextmanager
+def _planning_station(station: Station) -> Iterator[None]:
+    """Planning asks the arm what it reaches; that needs no connection."""
+    yield
+
+
+def _check_operator(options: SessionOptions, station: Station) -> None:
+    if options.operator == "auto" and station.simulation is None:
+        raise OptionsError(
+            f"--operator auto looks at a simulation's truth, and station {options.station!r} is"
+            " real; choose web or terminal"
+        )
+
+
+def _run(
+    asked: Conduct, folder: SessionFolder, setup: Setup, station: Station, terminal: Console
+) -> None:
+    from collection.annotator import Annotator, TappedJournal
+    from collection.progress import SessionProgress
+    from collection.robots.motion import make_safe
+    from collection.session import Session
+    from collection.trial import TrialContext
+    from labeling.controller import SessionController
+    from logs.disk import trials_left
+    from logs.recovery import recover_session
+
+    source = Source.OPERATOR_SIM if setup.options.operator == "auto" else Source.OPERATOR
+    if asked.resume:
+        for finding in recover_session(folder.path).findings:
+            terminal.print(f"{finding.place}: {finding.text}", markup=False)
+    stored = folder.open_journal()
+    journal = TappedJournal(stored)
+    state = SessionState.fold(folder.descriptor.trials, stored.entries)
+    controller = SessionController(
+        journal,
+        state,
+        stop=lambda: make_safe(station.arm, station.gripper),
+        trials_left=lambda: trials_left(folder.trials),
+    )
+    status, reason = "failed", ""
+    try:
+        open_segment(
+            stored,
+            state,
+            fingerprints(station, setup.plan),
+            operator=getpass.getuser(),
+            source=source,
+            accept=asked.accepted,
+        )
+        context = TrialContext(
+            folder.descriptor.session_id,
+            folder.path,
+            folder.descriptor.seed,
+            station,
+            setup.plan,
+            setup.objects,
+            folder.descriptor.versions,
+        )
+        pose_error = station.config.pose_error.total()
+        with ExitStack() as stack:
+            annotator = stack.enter_context(
+                Annotator(
+                    folder, controller, journal, stored.entries, setup.options.models, pose_error
+                )
+            )
+            progress = stack.enter_context(SessionProgress(controller, terminal))
+            session = Session(
+                context,
+                controller,
+                annotator,
+                folder.trial_folder,
+                setup.options.attempts,
+                attended=setup.options.operator != "auto",
+                say=progress.say,
+            )
+            stack.enter_context(_operator(setup, station, controller, session, progress))
+            stack.enter_context(_ending_on_signals(controller))
+            session.annotate_earlier()
+            session.run()
+        status = "finished" if state.next_work() is None else "ended"
+    except ReachError as error:
+        reason = str(error)
+        raise
+    except KeyboardInterrupt:
+        status, reason = "ended", "interrupted"
+        raise
+    finally:
+        controller.close(status, reason)  # type: ignore[arg-type]
+    _sum_up(asked, folder, terminal)
+
+
+@contextmanager
+def _ending_on_signals(controller: SessionController) -> Iterator[None]:
+    """SIGTERM ends the session in order: the robot finishes its motion, the journal its line."""
+    before = signal.signal(signal.SIGTERM, lambda *_: controller.request_end())
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGTERM, before)
+
+
+@contextmanager
+def _operator(
+    setup: Setup,
+    station: Station,
+    controller: SessionController,
+    session: Session,
+    progress: SessionProgress,
+) -> Iterator[None]:
+    from collection.operators import simulated_operator, web_console
+
+    if setup.options.operator == "auto":
+        with simulated_operator(controller, station, setup):
+            yield
+    else:
+        with web_console(controller, setup, session.context) as link:
+            progress.say(f"console: {link}")
+            if setup.options.operator == "terminal":
+                progress.say("terminal console: reach console LINK, here or over SSH")
+            yield
+
+
+def _sum_up(asked: Conduct, folder: SessionFolder, terminal: Console) -> None:
+    from collection.summary import summarize, summary_table
+
+    state = folder.read_state()
+    rows = summarize(state)
+    written = _write_report(asked, folder, terminal)
+    if asked.as_json:
+        counts = asdict(state.counts())
+        facts = {
+            "session": str(folder.path),
+            "simulated": folder.descriptor.simulated,
+            "report": None if written is None else str(written),
+            "objects": [{**asdict(row), "success_rate": row.success_rate} for row in rows],
+        }
+        json.dump({**counts, **facts}, sys.stdout)
+        print()
+        return
+    terminal.print(summary_table(rows, simulated=folder.descriptor.simulated))
+    terminal.print(f"session  {folder.path}", markup=False, highlight=False)
+    terminal.print(f"replay   reach replay {folder.path}", markup=False, highlight=False)
+    if written is not None:
+        terminal.print(f"report   {written}", markup=False, highlight=False)
+
+
+def _write_report(asked: Conduct, folder: SessionFolder, terminal: Console) -> Path | None:
+    if not asked.report or folder.read_state().counts().labelled == 0:
+        return None
+    from logs.report import write_report
+
+    with terminal.status("writing the report"):
+        return write_report([folder.path], folder.path / "report.html")

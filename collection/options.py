@@ -1,0 +1,42 @@
+"""What the operator chose for a session, resolved: it travels with the session."""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal
+
+from pydantic import BaseModel, ConfigDict, Field
+
+DEFAULT_MODELS = ("reach", "reach-robust", "point", "point-robust", "ellipse", "ellipse-robust")
+"""Models whose predictions annotate every trial."""
+
+OperatorKind = Literal["auto", "web", "terminal"]
+
+
+class SessionOptions(BaseModel):
+    """The options of `reach collect`.
+
+    Args:
+        station: name of a packaged station, or path of a station file.
+        objects: built-in names or mesh files.
+        grasps: per object.
+        repeats: of each grasp.
+        operator: a page, a terminal, or the simulated operator.
+        seed: everything random follows from it.
+        mesh_unit: unit of the mesh files' numbers.
+        models: whose predictions annotate each trial.
+        min_probability: stable poses below it are not planned.
+        attempts: so many void takes in a row end a trial that nobody watches.
+    """
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+    station: str = "simulated"
+    objects: tuple[str, ...]
+    grasps: Annotated[int, Field(ge=1)] = 25
+    repeats: Annotated[int, Field(ge=1)] = 5
+    operator: OperatorKind = "auto"
+    seed: int = 0
+    mesh_unit: str = "m"
+    models: tuple[str, ...] = DEFAULT_MODELS
+    min_probability: Annotated[float, Field(ge=0, lt=1)] = 0.01
+    attempts: Annotated[int, Field(ge=1)] = 8

@@ -1,0 +1,88 @@
+"""What the terminal shows while a session runs: object, trial n of N, successes, time left."""
+
+from __future__ import annotations
+
+import time
+from types import TracebackType
+from typing import Self
+
+from rich.console import Console
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn
+
+from labeling.controller import SessionController
+from logs.events import Outcome
+
+
+class SessionProgress:
+    """A live line on a terminal, a line a trial elsewhere; a context manager.
+
+    Args:
+        controller: whose session is shown.
+        console: where to.
+    """
+
+    def __init__(self, controller: SessionController, console: Console) -> None:
+        self._controller = controller
+        self._console = console
+        self._began = time.monotonic()
+        self._done_before = 0
+        self._shown = -1
+        self._bar = Progress(
+            TextColumn("{task.fields[doing]}"),
+            BarColumn(bar_width=24),
+            MofNCompleteColumn(),
+            TextColumn("{task.fields[rate]} lifted, {task.fields[left]} left"),
+            console=console,
+            transient=True,
+            disable=not console.is_terminal,
+        )
+        self._task = self._bar.add_task("", total=1, doing="starting", rate="-", left="?")
+
+    def __enter__(self) -> Self:
+        with self._controller.reading() as state:
+            self._done_before = self._shown = state.counts().labelled
+        self._bar.start()
+        self._forget = self._controller.listen(self._look)
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        self._forget()
+        self._bar.stop()
+
+    def say(self, message: str) -> None:
+        """Print a line above the progress."""
+        self._console.print(message, markup=False, highlight=False)
+
+    def _look(self) -> None:
+        with self._controller.reading() as state:
+            counts, trial = state.counts(), state.current_trial
+            take = trial.valid_take if trial else None
+        total = counts.planned - counts.skipped
+        rate = f"{counts.successes} of {counts.labelled}"
+        left = self._time_left(counts.labelled, total)
+        name = trial.planned.object_name if trial else ""
+        phase = trial.takes[-1].phase.value.lower().replace("_", " ") if trial else ""
+        doing = f"{name}: {phase}" if name else "starting"
+        self._bar.update(
+            self._task, completed=counts.labelled, total=total, doing=doing, rate=rate, left=left
+        )
+        if counts.labelled == self._shown or self._console.is_terminal:
+            return
+        self._shown = counts.labelled
+        label = take.label if take else None
+        verdict = "lifted" if label and label.outcome is Outcome.SUCCESS else "not lifted"
+        self.say(f"trial {counts.labelled} of {total}  {name}: {verdict}  ({rate}, {left} left)")
+
+    def _time_left(self, done: int, total: int) -> str:
+        fresh = done - self._done_before
+        if fresh <= 0:
+            return "?"
+        seconds = (time.monotonic() - self._began) / fresh * (total - done)
+        minutes, rest = divmod(round(seconds), 60)
+        hours, minutes = divmod(minutes, 60)
+        return f"{hours}:{minutes:02d}:{rest:02d}" if hours else f"{minutes}:{rest:02d}"

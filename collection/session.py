@@ -1,0 +1,127 @@
+"""A session: leads one trial after another through the console's controller to its label.
+
+The journal is the truth and every step is resumable: whatever happens to this process, the next
+one continues at the first trial that lacks something.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from collection.errors import CollectionError, DeviceError, PlacementError, Recovery
+from collection.trial import TrialContext, run_take
+from labeling.errors import SessionEndingError, TakeEndedError
+from registration.errors import RegistrationError
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from collection.annotator import Annotator
+    from labeling.controller import SessionController
+    from labeling.take import Take
+    from logs.state import TrialState
+
+
+class TooManyVoidsError(CollectionError):
+    """A trial was void so often in a row that a person has to look."""
+
+
+@dataclass(slots=True)
+class Session:
+    """The loop over the planned trials.
+
+    Args:
+        context: what all trials share.
+        controller: the session's writer.
+        annotator: scores and draws what is done.
+        folder_of: where a take's record goes, by trial id and take.
+        attempts: so many void takes of a trial in a row end an unattended session.
+        attended: a person watches; then the session holds instead of ending.
+        say: tells the operator at the terminal.
+    """
+
+    context: TrialContext
+    controller: SessionController
+    annotator: Annotator
+    folder_of: Callable[[str, int], Path]
+    attempts: int
+    attended: bool
+    say: Callable[[str], None]
+
+    def run(self) -> None:
+        """Run until every planned trial is labelled or skipped, or the session is to end.
+
+        Raises:
+            DeviceError: the station needs a person, and nobody is there.
+            TooManyVoidsError: a trial does not succeed in being tried, and nobody is there.
+        """
+        voids: Counter[str] = Counter()
+        while (work := self.controller.next_work()) is not None:
+            take = self.controller.begin(work)
+            try:
+                if not take.executed:
+                    self._run_take(take)
+                self._settle(work, take)
+            except TakeEndedError as ended:
+                self.say(str(ended))
+            except SessionEndingError:
+                return
+            except (RegistrationError, PlacementError, DeviceError) as error:
+                voids[work.trial_id] += 1
+                self._void(take, error, voids[work.trial_id])
+
+    def annotate_earlier(self) -> None:
+        """Annotate what an earlier process labelled and did not live to annotate."""
+        with self.controller.reading() as state:
+            trials = [trial for trial in state.order if trial.status == "labelled"]
+        for trial in trials:
+            take = trial.valid_take
+            if take is not None and self.annotator.lacks(take):
+                self.annotator.annotate(trial.trial_id, take)
+
+    def _run_take(self, take: Take) -> None:
+        run_take(self.context, take, self.folder_of(take.trial_id, take.number))
+
+    def _settle(self, work: TrialState, take: Take) -> None:
+        decision = take.await_label()
+        take.reset()
+        if decision.kind == "label" and work.valid_take is not None:
+            self.annotator.annotate(work.trial_id, work.valid_take)
+
+    def _void(self, take: Take, error: Exception, times: int) -> None:
+        """Give the take up; bring the station back, or wait for a person who can."""
+        take.void(f"{type(error).__name__}: {error}")
+        self.say(f"void: {error}")
+        recovery = error.recovery if isinstance(error, DeviceError) else Recovery.VOID
+        unready = isinstance(error, DeviceError) or not self.context.station.arm.state().ready
+        if unready and recovery is not Recovery.HALT:
+            recovery = self._recover()
+        if recovery is Recovery.HALT:
+            self._need_person(error)
+        elif times >= self.attempts:
+            self._need_person(
+                TooManyVoidsError(f"void {times} times in a row, the last time because: {error}")
+            )
+
+    def _recover(self) -> Recovery:
+        """Re-initialize the devices after a fault; HALT if only a person can help."""
+        from collection.robots.motion import recover
+
+        station = self.context.station
+        try:
+            station.arm.connect()
+            station.gripper.connect()
+            station.camera.connect()
+            recover(station.arm, station.gripper, station.config.motion)
+        except DeviceError as error:
+            self.say(f"the station did not recover: {error}")
+            return Recovery.HALT
+        return Recovery.RETRY
+
+    def _need_person(self, error: Exception) -> None:
+        if not self.attended:
+            raise error
+        self.controller.hold("station", str(error))

@@ -1,0 +1,85 @@
+"""A session in one table: object by object, what happened and what each model predicted."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from logs.events import Outcome
+
+if TYPE_CHECKING:
+    from rich.table import Table
+
+    from logs.state import SessionState, TakeState
+
+
+@dataclass(frozen=True, slots=True)
+class SummaryRow:
+    """One object's trials, or all of them.
+
+    Args:
+        name: of the object, or `all`.
+        trials: labelled trials.
+        successes: how many were stably lifted.
+        predictions: each model's mean score over the labelled trials it scored.
+    """
+
+    name: str
+    trials: int
+    successes: int
+    predictions: dict[str, float]
+
+    @property
+    def success_rate(self) -> float | None:
+        """Share of successes; None without a labelled trial."""
+        return self.successes / self.trials if self.trials else None
+
+
+def summarize(state: SessionState) -> list[SummaryRow]:
+    """One row an object, in the plan's order of first appearance, then one for all."""
+    takes: dict[str, list[TakeState]] = {}
+    for trial in state.order:
+        own = takes.setdefault(trial.planned.object_name, [])
+        if trial.status == "labelled" and trial.valid_take is not None:
+            own.append(trial.valid_take)
+    rows = [_row(name, own) for name, own in takes.items()]
+    return [*rows, _row("all", [take for own in takes.values() for take in own])]
+
+
+def summary_table(rows: Iterable[SummaryRow], *, simulated: bool) -> Table:
+    """The rows as a table for the terminal."""
+    from rich.table import Table
+
+    rows = list(rows)
+    models = list(dict.fromkeys(name for row in rows for name in row.predictions))
+    title = "Simulated trials: labels and outcomes come from MuJoCo" if simulated else None
+    table = Table(title=title, title_justify="left")
+    table.add_column("object")
+    for heading in ("trials", "success", *models):
+        table.add_column(heading, justify="right")
+    for row in rows:
+        if row.name == "all":
+            table.add_section()
+        scores = [_share(row.predictions.get(model)) for model in models]
+        table.add_row(row.name, str(row.trials), _share(row.success_rate), *scores)
+    return table
+
+
+def _row(name: str, takes: list[TakeState]) -> SummaryRow:
+    scores: dict[str, list[float]] = {}
+    for take in takes:
+        for model, scored in take.scores.items():
+            scores.setdefault(model, []).append(scored.value)
+    return SummaryRow(
+        name,
+        trials=len(takes),
+        successes=sum(
+            take.label is not None and take.label.outcome is Outcome.SUCCESS for take in takes
+        ),
+        predictions={model: sum(values) / len(values) for model, values in scores.items()},
+    )
+
+
+def _share(value: float | None) -> str:
+    return "-" if value is None else f"{100 * value:.0f} %"

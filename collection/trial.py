@@ -1,0 +1,270 @@
+"""One trial, from the placed object to the closed record: [Danielczuk2019] Sect. 5.
+
+    place -> capture -> register -> execute -> record
+
+Label and scores come later, as events that point at the record. A fault in seeing or moving
+raises, and the session voids the take; it is never a failed grasp.
+"""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from collection import record_mapping as mapping
+from collection.errors import PlacementError, UnreachableError, UnsafeMotionError
+from collection.robots.execution import Execution
+from collection.robots.motion import dry_run, execute_grasp, reachable_grasps
+from collection.trial_watch import TrialWatch
+from collection.truth import registration_error, true_outcome
+from logs.descriptions import STATION_FILE, gripper_attachment, robot_attachment
+from logs.events import Phase, SensorVerdict
+from logs.mesh_attachment import mesh_attachment
+from logs.recorder import TrialRecorder
+from logs.records import AttachmentRecord, ExitStatus
+from reach.arrays import FloatArray
+from reach.grasp import Grasp
+from registration.register import register
+from registration.result import Registration
+
+if TYPE_CHECKING:
+    from collection.plan_records import Plan, PlannedGrasp, PlannedPose, PlannedTrial
+    from collection.station import Station
+    from labeling.take import Take
+    from reach.objects import GraspObject
+    from registration.frame import DepthFrame
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class TrialContext:
+    """What all trials of a session share.
+
+    Args:
+        session_id: of the session.
+        session_path: its folder.
+        seed: of the session.
+        station: connected devices.
+        plan: of the session.
+        objects: by name.
+        versions: of the software.
+    """
+
+    session_id: str
+    session_path: Path
+    seed: int
+    station: Station
+    plan: Plan
+    objects: Mapping[str, GraspObject]
+    versions: Mapping[str, str]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Attempt:
+    """One take: what is tried, on what, and everything random in it."""
+
+    context: TrialContext
+    take: Take
+    trial: PlannedTrial
+    grasp: PlannedGrasp
+    pose: PlannedPose
+    obj: GraspObject
+    seed: int
+
+    @property
+    def station(self) -> Station:
+        return self.context.station
+
+
+def run_take(context: TrialContext, take: Take, folder: Path) -> None:
+    """Run one take of a trial up to its closed record; afterwards a label is due.
+
+    Args:
+        context: of the session.
+        take: the take, just begun.
+        folder: where its record goes.
+
+    Raises:
+        RegistrationError: the image does not tell where the object is.
+        PlacementError: the object lies otherwise than planned, or out of reach.
+        DeviceError: a camera or the robot did not do what it was told.
+        TakeEndedError: the operator ended the take.
+        SessionEndingError: the session is to end.
+    """
+    attempt = _attempt(context, take)
+    _place(attempt)
+    with TrialRecorder(folder, now=context.station.clock.now_ns) as recorder:
+        try:
+            _start(attempt, recorder)
+            frame = _capture(attempt, recorder)
+            T_world_object = _register(attempt, frame, recorder)
+            execution = _execute(attempt, T_world_object, recorder)
+        except Exception as error:
+            recorder.stop(ExitStatus.FAIL, f"{type(error).__name__}: {error}")
+            raise
+        record = recorder.stop(ExitStatus.SUCCESS)
+    take.record_executed(
+        str(record.relative_to(context.session_path)), _sensor_verdict(attempt, execution)
+    )
+
+
+def take_seed(session_seed: int, trial_id: str, take: int) -> int:
+    """Seed of everything random in a take."""
+    digest = hashlib.sha256(f"{session_seed}/{trial_id}/{take}".encode()).digest()
+    return int.from_bytes(digest[:6], "big")
+
+
+def _attempt(context: TrialContext, take: Take) -> _Attempt:
+    trial = next(t for t in context.plan.trials if t.trial_id == take.trial_id)
+    grasp = context.plan.grasp(trial.grasp_id)
+    return _Attempt(
+        context,
+        take,
+        trial,
+        grasp,
+        context.plan.pose_of(grasp),
+        context.objects[trial.object_name],
+        take_seed(context.seed, trial.trial_id, take.number),
+    )
+
+
+def _place(attempt: _Attempt) -> None:
+    """Wait for the operator; where the table is simulated, the object appears on it now."""
+    attempt.take.wait_placed()
+    simulation = attempt.station.simulation
+    if simulation is None:
+        return
+
+    def accept(T_world_object: FloatArray) -> bool:
+        return _within_reach(attempt.station, T_world_object @ attempt.grasp.T_object_gripper)
+
+    rng = np.random.default_rng(attempt.seed)
+    simulation.place(attempt.obj, attempt.pose, rng, accept=accept)
+
+
+def _within_reach(station: Station, T_world_gripper: FloatArray) -> bool:
+    """Whether the whole way of the trial is free, as far as a dry run tells."""
+    settings = station.config.motion
+    if not reachable_grasps(station.arm, T_world_gripper[None], settings)[0]:
+        return False
+    try:
+        dry_run(station.arm, T_world_gripper, settings)
+    except (UnreachableError, UnsafeMotionError):
+        return False
+    return True
+
+
+def _start(attempt: _Attempt, recorder: TrialRecorder) -> None:
+    context, station = attempt.context, attempt.station
+    gripper = station.gripper.geometry
+    descriptor = mapping.trial_descriptor(
+        attempt.trial,
+        attempt.grasp,
+        attempt.pose,
+        attempt.obj,
+        gripper_name=gripper.name,
+        session_id=context.session_id,
+        take=attempt.take.number,
+        seed=attempt.seed,
+        simulated=station.simulation is not None,
+        time_ns=station.clock.now_ns(),
+        versions=context.versions,
+    )
+    recorder.start(
+        descriptor,
+        [
+            mesh_attachment(attempt.obj),
+            gripper_attachment(gripper),
+            robot_attachment(mapping.robot_description(station.arm.description)),
+            AttachmentRecord(STATION_FILE, "application/toml", station.text.encode()),
+        ],
+    )
+
+
+def _capture(attempt: _Attempt, recorder: TrialRecorder) -> DepthFrame:
+    attempt.take.advance(Phase.CAPTURE)
+    recorder.phase("capture")
+    frame = attempt.station.camera.capture()
+    recorder.camera(mapping.camera_record(frame), frame.time_ns)
+    recorder.depth(mapping.depth_image(frame))
+    if frame.color is not None:
+        recorder.color(frame.time_ns, frame.color)
+    return frame
+
+
+def _register(attempt: _Attempt, frame: DepthFrame, recorder: TrialRecorder) -> FloatArray:
+    """Find the object; ask the operator where the image leaves a doubt that matters."""
+    attempt.take.advance(Phase.REGISTER)
+    recorder.phase("register")
+    found = register(attempt.obj, frame, stable_pose=attempt.pose.index, seed=attempt.seed)
+    if found.contradicts_declared:
+        recorder.registration(mapping.registration_record(found, frame.time_ns))
+        raise PlacementError(
+            f"{attempt.obj.name} lies in stable pose {found.stable_pose},"
+            f" planned is pose {attempt.pose.index}: put it down again"
+        )
+    T_world_object = found.T_world_object
+    planned = attempt.grasp.T_object_gripper
+    if found.ambiguous and not found.same_grasp_outcome(attempt.obj, planned):
+        T_world_object = _ask(attempt, found, recorder)
+    recorder.registration(mapping.registration_record(found, frame.time_ns, T_world_object))
+    return T_world_object
+
+
+def _ask(attempt: _Attempt, found: Registration, recorder: TrialRecorder) -> FloatArray:
+    recorder.registration(mapping.registration_record(found, attempt.station.clock.now_ns()))
+    poses = [found.T_world_object, *(rival.T_world_object for rival in found.rivals)]
+    chosen = attempt.take.confirm_pose(
+        {
+            "margin": found.margin,
+            "poses": [pose.tolist() for pose in poses],
+            "rivals": [
+                {"render_cost": rival.render_cost, "stable_pose": rival.stable_pose}
+                for rival in found.rivals
+            ],
+        }
+    )
+    if chosen is None:
+        raise PlacementError("the operator refused every pose: put the object down again")
+    return poses[chosen]
+
+
+def _execute(attempt: _Attempt, T_world_object: FloatArray, recorder: TrialRecorder) -> Execution:
+    """Carry the planned grasp over to the registered pose, and try it."""
+    station, planned = attempt.station, Grasp(attempt.grasp.T_object_gripper)
+    T_world_gripper = T_world_object @ planned.T_object_gripper
+    true_errors = _true_errors(attempt, T_world_object)
+    attempt.take.advance(Phase.EXECUTE)
+    watch = TrialWatch(station, recorder)
+    try:
+        execution = execute_grasp(
+            station.arm,
+            station.gripper,
+            T_world_gripper,
+            station.clock,
+            settings=station.config.motion,
+            on_event=watch.phase,
+            on_sample=watch.sample,
+        )
+    except (UnreachableError, UnsafeMotionError) as error:
+        raise PlacementError(f"out of reach where it lies: put it down again ({error})") from error
+    recorder.execution(mapping.execution_record(execution, T_world_object, true_errors))
+    return execution
+
+
+def _true_errors(attempt: _Attempt, T_world_object: FloatArray) -> dict[str, float]:
+    """How far registration was off; for statistics, no step of the trial sees it."""
+    simulation = attempt.station.simulation
+    if simulation is None:
+        return {}
+    return registration_error(attempt.obj, simulation.true_T_world_object(), T_world_object)
+
+
+def _sensor_verdict(attempt: _Attempt, execution: Execution) -> SensorVerdict:
+    simulation, seen = attempt.station.simulation, execution.sensor_verdict
+    truth = None if simulation is None else true_outcome(simulation.verdict())
+    return SensorVerdict(lifted=seen.lifted, jaw_width=seen.width_held, truth=truth)
