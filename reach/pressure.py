@@ -67,7 +67,8 @@ def triangle_frames(patch: Patch) -> TriangleFrames:
 def normal_integrals(frames: TriangleFrames) -> FloatArray:
     """Integral of q over each triangle, f_z,i,max / k, shape (M,) [m^3]."""
     a, b, d = frames.coefficients.T
-    return frames.areas / 3.0 * (a * frames.x.sum(axis=1) + b * frames.y.sum(axis=1) + 3.0 * d)
+    sums: FloatArray = a * frames.x.sum(axis=1) + b * frames.y.sum(axis=1) + 3.0 * d
+    return frames.areas / 3.0 * sums
 
 
 def stiffness(frames: TriangleFrames, force: float) -> float:

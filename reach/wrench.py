@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -116,13 +117,14 @@ def linearized_margin(lam: WrenchSet, wrench: FloatArray, cap: float) -> float:
     bounds = np.column_stack([np.append(lam.lower, 0.0), np.append(lam.upper, cap)])
     cost = np.zeros(n + 1)
     cost[-1] = -1.0
-    solution = linprog(
+    inequalities: Any = csc_matrix(np.column_stack([lam.A, np.zeros(len(lam.A))]))
+    solution: Any = linprog(
         cost,
-        csc_matrix(np.column_stack([lam.A, np.zeros(len(lam.A))])),
+        inequalities,
         lam.b,
         np.column_stack([lam.G, -wrench]),
         np.zeros(6),
-        bounds,
+        bounds.tolist(),
         method="highs",
     )
     if solution.x is None:
