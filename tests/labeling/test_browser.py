@@ -1,0 +1,356 @@
+"""Real keys in a real headless browser, on the real page."""
+
+from __future__ import annotations
+
+import shutil
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from labeling.console import Console
+from labeling.server import ConsoleServer
+from logs.events import Phase
+from logs.journal import read_journal
+
+CHROMIUM = shutil.which("chromium")
+DRIVER = shutil.which("chromedriver")
+FLAGS = (
+    "--headless=new --no-sandbox --use-angle=swiftshader --enable-unsafe-swiftshader"
+    " --disable-dev-shm-usage --disable-quic --no-first-run --disable-background-networking"
+    " --disable-component-update --disable-sync --window-size=1400,900"
+)
+
+pytestmark = [
+    pytest.mark.browser,
+    pytest.mark.skipif(not (CHROMIUM and DRIVER), reason="needs chromium and chromium-driver"),
+]
+
+
+@pytest.fixture(scope="module")
+def browser(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Any]:
+    from selenium import webdriver
+
+    options = webdriver.ChromeOptions()
+    for flag in FLAGS.split():
+        options.add_argument(flag)
+    options.add_argument(f"--user-data-dir={tmp_path_factory.mktemp('profile')}")
+    options.binary_location = CHROMIUM
+    options.set_capability("goog:loggingPrefs", {"browser": "ALL"})
+    driver = webdriver.Chrome(options=options, service=webdriver.ChromeService(DRIVER))
+    yield driver
+    driver.quit()
+
+
+class Page:
+    """The console's page: press keys, wait for what it shows."""
+
+    def __init__(self, driver: Any, link: str) -> None:
+        self.driver = driver
+        driver.get("about:blank")
+        driver.get(link)
+        self.wait("return document.body.dataset.ready === 'true'")
+        self.until_state("READY", "PLACE_OBJECT", "AWAITING_LABEL", "STOPPED", "HELD")
+
+    def run(self, script: str, *arguments: Any) -> Any:
+        return self.driver.execute_script(script, *arguments)
+
+    def wait(self, script: str, *arguments: Any) -> Any:
+        from selenium.webdriver.support.ui import WebDriverWait
+
+        return WebDriverWait(self.driver, 15, 0.02).until(
+            lambda driver: driver.execute_script(script, *arguments), script
+        )
+
+    def until_state(self, *states: str) -> None:
+        self.wait("return arguments[0].includes(document.body.dataset.state)", states)
+
+    def receipt(self, kind: str) -> str:
+        self.wait("return document.getElementById('receipt').dataset.kind === arguments[0]", kind)
+        return str(self.run("return document.getElementById('receipt').textContent"))
+
+    def press(self, *keys: str) -> None:
+        from selenium.webdriver.common.action_chains import ActionChains
+
+        ActionChains(self.driver).send_keys(*keys).perform()
+
+    def element(self, identity: str) -> Any:
+        return self.driver.find_element("id", identity)
+
+
+def labels(bench: Any) -> list[str]:
+    entries = read_journal(bench.folder.journal_path)
+    return [e.event.kind for e in entries if e.event.kind in ("label", "relabel", "undo", "skip")]
+
+
+@pytest.fixture
+def page(bench: Any, serve: Any, browser: Any) -> Page:
+    return Page(browser, serve(bench).link)
+
+
+@pytest.fixture
+def awaiting(bench: Any, page: Page) -> Page:
+    """The page, with the first trial executed and waiting for its label."""
+    bench.executed()
+    page.until_state("AWAITING_LABEL")
+    return page
+
+
+def test_one_key_labels_and_one_key_undoes(bench: Any, awaiting: Page) -> None:
+    awaiting.press("s")
+    assert "trial 1 success" in awaiting.receipt("stored")
+    assert bench.trial(1).label.outcome == "success"
+    awaiting.press("u")
+    awaiting.wait("return document.body.dataset.target === 'relabel'")
+    assert bench.trial(1).label is None
+    awaiting.press("t", "s")
+    awaiting.wait("return document.querySelector('#history .success') !== null")
+    assert bench.trial(1).label.rotated
+    assert labels(bench) == ["label", "undo", "relabel"]
+
+
+def test_a_failure_takes_its_reason_and_the_note(bench: Any, awaiting: Page) -> None:
+    awaiting.press("n")
+    awaiting.press("sfu 123 missed by a hair")
+    assert labels(bench) == []
+    awaiting.press("\ue007")  # Enter leaves the field
+    awaiting.press("f")
+    awaiting.wait("return !document.getElementById('choices').hidden")
+    awaiting.press("3")
+    awaiting.receipt("stored")
+    label = bench.trial(1).label
+    assert (label.outcome, label.reason) == ("failure", "dropped_while_held")
+    assert label.note == "sfu 123 missed by a hair"
+
+
+def test_a_digit_alone_means_nothing(bench: Any, awaiting: Page) -> None:
+    awaiting.press("1", "2", "3")
+    awaiting.press("t")
+    awaiting.wait("return document.getElementById('do-rotated').ariaPressed === 'true'")
+    assert labels(bench) == []
+
+
+def test_a_held_down_key_labels_once(bench: Any, awaiting: Page) -> None:
+    repeat = {"type": "keyDown", "key": "s", "code": "KeyS", "text": "s", "autoRepeat": False}
+    for index in range(30):
+        awaiting.driver.execute_cdp_cmd(
+            "Input.dispatchKeyEvent", {**repeat, "autoRepeat": index > 0}
+        )
+    awaiting.driver.execute_cdp_cmd("Input.dispatchKeyEvent", {"type": "keyUp", "key": "s"})
+    awaiting.receipt("stored")
+    bench.executed()
+    awaiting.wait("return document.getElementById('trial-number').textContent === '2'")
+    assert labels(bench) == ["label"]
+
+
+def test_keys_with_modifiers_are_not_ours(bench: Any, awaiting: Page) -> None:
+    from selenium.webdriver.common.action_chains import ActionChains
+
+    for modifier in ("\ue009", "\ue00a"):  # Control, Alt
+        chain = ActionChains(awaiting.driver).key_down(modifier).send_keys("s").key_up(modifier)
+        chain.perform()
+    awaiting.press("t")
+    awaiting.wait("return document.getElementById('do-rotated').ariaPressed === 'true'")
+    assert labels(bench) == []
+
+
+def test_space_on_a_button_that_was_clicked_is_no_second_label(bench: Any, awaiting: Page) -> None:
+    awaiting.element("do-success").click()
+    awaiting.receipt("stored")
+    bench.executed()
+    awaiting.wait("return document.getElementById('trial-number').textContent === '2'")
+    awaiting.run("document.getElementById('do-success').focus()")
+    awaiting.press(" ")
+    awaiting.press("\ue007")
+    awaiting.press("t")
+    awaiting.wait("return document.getElementById('do-rotated').ariaPressed === 'true'")
+    assert labels(bench) == ["label"]
+
+
+def test_escape_stops_also_while_typing_and_clearing_asks_twice(bench: Any, awaiting: Page) -> None:
+    awaiting.press("n")
+    awaiting.press("hal", "\ue00c")
+    awaiting.until_state("STOPPED")
+    assert bench.state.stopped
+    awaiting.run("document.getElementById('note').blur()")
+    awaiting.press("s")
+    assert "stopped" in awaiting.receipt("refused")
+    assert labels(bench) == []
+    awaiting.element("clear-stop").click()
+    assert bench.state.stopped
+    awaiting.element("confirm-clear-yes").click()
+    awaiting.until_state("AWAITING_LABEL")
+    assert not bench.state.stopped
+
+
+def test_enter_places_and_a_redo_asks_for_its_cause(
+    bench: Any, page: Page, in_thread: Callable[..., Any]
+) -> None:
+    waiting = in_thread(bench.begin().wait_placed)
+    page.until_state("PLACE_OBJECT")
+    page.press("\ue007")
+    waiting()
+    take = bench.trial(1).takes[0]
+    assert take.placed
+    page.receipt("stored")
+    page.press("r")
+    page.wait("return !document.getElementById('choices').hidden")
+    page.press("2")
+    page.wait("return document.getElementById('count-again').textContent === '1 / 0'")
+    assert (take.status, take.ended_because) == ("redone", "seeing")
+
+
+def test_a_skip_asks_first_and_can_be_undone(bench: Any, awaiting: Page) -> None:
+    awaiting.press("k")
+    awaiting.wait("return !document.getElementById('choices').hidden")
+    assert labels(bench) == []
+    awaiting.press("k")
+    awaiting.wait("return document.getElementById('count-skipped').textContent === '1'")
+    awaiting.press("u")
+    awaiting.wait("return document.getElementById('count-skipped').textContent === '0'")
+    assert labels(bench) == ["skip", "undo"]
+
+
+def test_ambiguous_poses_are_chosen_by_digit(
+    bench: Any, page: Page, in_thread: Callable[..., Any]
+) -> None:
+    take = bench.begin()
+    bench.do("placed", 1)
+    take.advance(Phase.REGISTER)
+    waiting = in_thread(lambda: take.confirm_pose({"rivals": [{}]}))
+    page.until_state("CONFIRM_POSE")
+    page.press("2")
+    assert waiting() == 1
+
+
+def test_predictions_are_drawn_only_after_the_label(bench: Any, awaiting: Page) -> None:
+    bench.controller.begin(bench.trial(1)).record_score("reach", "1", 0.4321, {})
+    awaiting.press("t")
+    awaiting.wait("return document.getElementById('do-rotated').ariaPressed === 'true'")
+    assert "0.43" not in awaiting.driver.page_source
+    awaiting.press("s")
+    awaiting.wait("return document.getElementById('history').textContent.includes('0.43')")
+
+
+def test_text_from_the_session_never_becomes_markup(bench: Any, awaiting: Page) -> None:
+    evil = "<img src=x onerror=window.hacked=1>"
+    bench.controller.hold("robot", evil)
+    bench.do("label", 1, outcome="success")
+    awaiting.until_state("HELD")
+    assert evil in awaiting.element("banner-text").text
+    assert awaiting.run("return window.hacked") is None
+
+
+def test_a_lost_connection_shows_and_queues_nothing(bench: Any, serve: Any, browser: Any) -> None:
+    server = serve(bench)
+    bench.controller.set_light("robot", ok=True)
+    bench.executed()
+    page = Page(browser, server.link)
+    page.until_state("AWAITING_LABEL")
+    server.__exit__(None, None, None)
+    page.until_state("LOST")
+    lights = page.run(
+        "return [...document.querySelectorAll('.lights li')].map(l => l.dataset.light)"
+    )
+    assert lights[0] == lights[2] == "bad"
+    page.press("s")
+    assert "nothing was sent" in page.receipt("refused")
+    console = Console(bench.controller, server._console.actor, "monday", hold_without_console=False)
+    with ConsoleServer(console, server.access):
+        page.until_state("AWAITING_LABEL")
+        assert labels(bench) == []
+        page.press("s")
+        page.receipt("stored")
+    assert labels(bench) == ["label"]
+
+
+def test_a_label_without_an_answer_shows_unconfirmed_until_the_view_tells(
+    bench: Any, awaiting: Page
+) -> None:
+    awaiting.run(
+        """
+        const real = window.fetch;
+        window.fetch = async (path, options) => {
+          const answer = await real(path, options);
+          if (path === "/api/commands") { window.fetch = real; throw new TypeError("cut"); }
+          return answer;
+        };
+        """
+    )
+    awaiting.press("s")
+    awaiting.receipt("stored")  # the next view names the command among the stored ones
+    awaiting.wait("return document.getElementById('unconfirmed').hidden")
+    assert labels(bench) == ["label"]
+
+
+def test_the_recording_is_shown_and_its_keys_still_label(
+    bench: Any, serve: Any, browser: Any, tmp_path: Path
+) -> None:
+    rerun = pytest.importorskip("rerun")
+    recording = bench.folder.path / "trial.rrd"
+    stream = rerun.RecordingStream("reach-test", recording_id="r")
+    stream.set_sinks(rerun.FileSink(str(recording)))
+    stream.log("world/points", rerun.Points3D([[0, 0, 0], [1, 1, 1]], radii=0.1))
+    stream.disconnect()
+    bench.labelled("failure", reason="missed")
+    server = serve(bench, mode="review", recordings=lambda trial: recording)
+    browser.get("about:blank")
+    browser.get(server.link)
+    page = Page.__new__(Page)
+    page.driver = browser
+    page.wait("return document.querySelector('#review-list li') !== null")
+    page.wait("return !document.getElementById('viewer').hidden")
+    browser.switch_to.frame("viewer")
+    page.wait("return document.body?.dataset.started === 'true'")
+    page.run("document.getElementById('canvas').focus(); window.focus()")
+    assert page.run("return document.hasFocus()")
+    page.press("s")
+    browser.switch_to.default_content()
+    assert "trial 1 success" in page.receipt("stored")
+    assert bench.trial(1).label.outcome == "success"
+
+
+def test_a_foreign_frame_s_keys_are_ignored(bench: Any, awaiting: Page) -> None:
+    awaiting.run("window.postMessage({key: 's'}, '*')")
+    awaiting.press("t")
+    awaiting.wait("return document.getElementById('do-rotated').ariaPressed === 'true'")
+    assert labels(bench) == []
+
+
+def test_a_remapped_key_labels(bench: Any, awaiting: Page) -> None:
+    awaiting.element("open-keys").click()
+    awaiting.run(
+        "[...document.querySelectorAll('#key-table tr')]"
+        ".find(row => row.textContent.startsWith('success')).querySelector('button').click()"
+    )
+    awaiting.press("g")
+    awaiting.run("document.getElementById('keys').close()")
+    awaiting.press("s")
+    awaiting.press("g")
+    awaiting.receipt("stored")
+    assert labels(bench) == ["label"]
+    awaiting.run("localStorage.clear()")
+
+
+def test_the_page_fits_a_tablet(bench: Any, awaiting: Page) -> None:
+    awaiting.driver.set_window_size(820, 1180)
+    try:
+        for name in ("do-success", "do-failure", "stop"):
+            box = awaiting.element(name).rect
+            assert box["height"] >= 44 and box["width"] >= 44
+            seen = awaiting.run(
+                "const b = document.getElementById(arguments[0]).getBoundingClientRect();"
+                "return b.top >= 0 && b.bottom <= innerHeight && b.right <= innerWidth",
+                name,
+            )
+            assert seen, name
+    finally:
+        awaiting.driver.set_window_size(1400, 900)
+
+
+def test_the_page_reports_no_errors(browser: Any, awaiting: Page) -> None:
+    browser.get_log("browser")  # what earlier tests provoked
+    awaiting.press("f", "x", "t", "p", "p", "r", "x")
+    awaiting.wait("return document.getElementById('choices').hidden")
+    assert [entry for entry in browser.get_log("browser") if entry["level"] == "SEVERE"] == []
