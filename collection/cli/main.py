@@ -20,6 +20,7 @@ COMMANDS: dict[str, str] = {
     "evaluate": "evaluate",
     "register": "register",
     "sample": "sample",
+    "score": "score",
     "objects": "objects",
 }
 """Command name -> module in collection.cli that holds a function of the same name."""
