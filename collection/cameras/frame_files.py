@@ -8,6 +8,7 @@ points (x, y, z) of every pixel, row by row, in the camera's frame (x right, y d
 
 from __future__ import annotations
 
+import io
 import zipfile
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -107,7 +108,8 @@ def write_frame(path: Path, frame: DepthFrame, **extra: Any) -> None:
 
 def _read_npz(path: Path) -> dict[str, Any]:
     try:
-        with np.load(path, allow_pickle=False) as archive:
+        # From memory: numpy leaves the file of a broken archive open.
+        with np.load(io.BytesIO(path.read_bytes()), allow_pickle=False) as archive:
             values: dict[str, Any] = {name: archive[name] for name in archive.files}
     except (OSError, ValueError, EOFError, KeyError, zipfile.BadZipFile) as error:
         raise FrameFileError(f"{path.name} is not a whole .npz file: {error}") from error

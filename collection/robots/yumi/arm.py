@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Self
 
@@ -170,8 +171,18 @@ class YumiRobotArm:
         return Motion(start_ns, self._link.clock.now_ns(), reached, T)
 
     def home(self, *, speed: Speed, on_sample: ArmListener | None = None) -> Motion:
-        """Move to the home configuration."""
-        return self.move_to_joints(self.description.home, speed=speed, on_sample=on_sample)
+        """Move to the home configuration, around the robot's own body if that is in the way.
+
+        Raises:
+            UnsafeMotionError: no way there was found; nothing moved.
+        """
+        from collection.robots.detour import detour
+
+        legs = [
+            self.move_to_joints(path.joints[-1], speed=speed, on_sample=on_sample)
+            for path in detour(self._planner, self.joints(), self.description.home)
+        ]
+        return replace(legs[-1], start_ns=legs[0].start_ns)
 
     def stop(self) -> None:
         """Stop any motion now, of both arms; `clear_error` makes the arm follow again.

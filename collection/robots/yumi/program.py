@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Callable
+from itertools import count
+from typing import NoReturn
 
 from collection.clock import NANOSECONDS, Clock
 from collection.errors import (
@@ -26,6 +28,9 @@ from collection.robots.yumi.rapid_text import from_rapid
 from collection.robots.yumi.web_services import WebServices
 
 REQUEST, REPLY, VERSION, JAW = "reach_request", "reach_reply", "reach_version", "reach_jaw"
+
+LOOKS_PER_STATE = 4
+"""Looks at the reply for one at whether the program still runs."""
 
 
 class RapidProgram:
@@ -144,12 +149,13 @@ class RapidProgram:
         meanwhile: Callable[[], None] | None,
     ) -> Reply:
         deadline = self._clock.now_ns() + round(timeout * NANOSECONDS)
+        looks = count()
         while True:
             self._clock.sleep(self._poll_interval)
             reply = self.reply()
             if reply.done and reply.sequence == sequence:
                 return reply
-            if not self._services.is_running():
+            if next(looks) % LOOKS_PER_STATE == 0 and not self._services.is_running():
                 raise self._stopped()
             if self._clock.now_ns() > deadline:
                 self._give_up(request, timeout)
@@ -163,7 +169,7 @@ class RapidProgram:
         self._last_event = newest_event(self._services)
         return reason
 
-    def _give_up(self, request: Request, timeout: float) -> None:
+    def _give_up(self, request: Request, timeout: float) -> NoReturn:
         self._services.stop_programs()
         raise RobotTimeoutError(
             f"{request.command.name.lower()} was not done within {timeout:.1f} s; stopped"
