@@ -56,7 +56,7 @@ def session_dataset(path: Path, *, unblinded: bool = False) -> Dataset:
         gripper=_gripper(facts),
         trials=trials,
         left_out=tuple(_left_out(trial, name) for trial in state.order if trial not in counted),
-        pose_error=_pose_error(trials, folder.descriptor.config.get("pose_error")),
+        pose_error=_pose_error(trials, _station_error(folder)),
         notes=_notes(counted, unblinded),
     )
 
@@ -134,7 +134,9 @@ def _labeled_trial(
         takes=len(trial.takes),
         redos=tuple(t.ended_because for t in redone),
         redo_outcomes=tuple(_sensed(t) for t in redone),
-        voids=tuple(t.ended_because for t in trial.takes if t.status in ("voided", "interrupted")),
+        voids=tuple(
+            _short(t.ended_because) for t in trial.takes if t.status in ("voided", "interrupted")
+        ),
         record=take.record,
         record_sha256=facts.sha256,
         simulated=described.simulated,
@@ -195,23 +197,44 @@ def _score(event: Scored) -> StoredScore:
     return StoredScore(event.value, event.version, plain)
 
 
+def _short(cause: str) -> str:
+    """The kind of a cause, without the numbers of the single case."""
+    return cause.split(":")[0].strip() or "unknown"
+
+
 def _left_out(trial: TrialState, session: str) -> LeftOut:
     planned = trial.planned
     reason = trial.needs_label or _LEFT_OUT.get(trial.status, trial.status)
     if trial.status == "pending" and trial.takes:
-        reason = f"void, not taken again: {trial.takes[-1].ended_because}"
+        reason = f"void, not taken again ({_short(trial.takes[-1].ended_because)})"
     return LeftOut(
         trial.trial_id, session, planned.number, planned.object_name, planned.grasp_id, reason
     )
 
 
-def _pose_error(trials: Iterable[LabeledTrial], station: object) -> StatedPoseError | None:
+def _station_error(folder: SessionFolder) -> tuple[float, float] | None:
+    """Variances of translation [m^2] and rotation [rad^2] that the station file states.
+
+    Its section `pose_error` holds standard deviations named by cause: calibration, actuation.
+    """
+    station = folder.descriptor.config.get("station")
+    stated = station.get("pose_error") if isinstance(station, dict) else None
+    if not isinstance(stated, dict):
+        return None
+    numbers = {key: float(value) for key, value in stated.items() if isinstance(value, int | float)}
+    translation = sum(v * v for key, v in numbers.items() if key.endswith("_translation"))
+    rotation = sum(v * v for key, v in numbers.items() if key.endswith("_rotation"))
+    return translation, rotation
+
+
+def _pose_error(
+    trials: Iterable[LabeledTrial], station: tuple[float, float] | None
+) -> StatedPoseError | None:
     """Root mean square of the registrations' own deviations, and the station's beside them.
 
     Args:
         trials: those that count.
-        station: `pose_error` of the session's configuration, calibration and actuation together:
-            {"translation": [m], "rotation": [rad]}; None if it has none.
+        station: stated variances of calibration and actuation together.
     """
     covariances = [t.execution.covariance for t in trials if t.execution.covariance is not None]
     if not covariances:
@@ -222,10 +245,9 @@ def _pose_error(trials: Iterable[LabeledTrial], station: object) -> StatedPoseEr
     variances = np.where(np.isfinite(diagonals), diagonals, 0.0).mean(axis=0)
     translation, rotation = variances[3:].mean(), variances[:3].mean()
     basis = f"root mean square of {len(covariances)} registrations' stated covariances"
-    if isinstance(station, dict):
-        translation += float(station["translation"]) ** 2
-        rotation += float(station["rotation"]) ** 2
-        basis += ", and the station's stated calibration and actuation error"
+    if station is not None:
+        translation, rotation = translation + station[0], rotation + station[1]
+        basis += ", and calibration and actuation as the station file states them"
     else:
         basis += "; calibration and actuation not included"
     return StatedPoseError(float(np.sqrt(translation)), float(np.sqrt(rotation)), basis)
