@@ -81,7 +81,7 @@ class Watcher:
         highest = max(sight.clearance for sight in self._sights)
         lifted = held >= HELD_TIME
         turned = self._turned(raised) if lifted else 0.0
-        return SimulatedVerdict(lifted, turned > ROTATED_ANGLE, held, highest, turned)
+        return SimulatedVerdict(lifted, bool(turned > ROTATED_ANGLE), held, highest, turned)
 
     def _before_lowering(self) -> list[_Sight]:
         """What was seen until the hand left its highest place for good."""

@@ -24,14 +24,15 @@ from reach.transforms import apply, exp, make_transform, rotation_about
 from reach.world.grasp_world import GraspWorld
 from reach.world.parameters import WorldParameters
 
-PLACEMENTS_TRIED = 200
+PLACEMENTS_TRIED = 60
 SETTLING_TIME = 0.4
 PARKED = make_transform(None, (0.0, 0.0, 10.0))
 NEAR = 0.01
 """Physics is stepped while the hand's bounding box is this near the object's sphere [m]."""
 LOOK_PERIOD = 0.02
 """Between two looks at a held object [s]."""
-SLIPPERY = 0.02
+SLIPPERY = 1e-5
+"""Friction of a scripted slip: at 20 N even 0.001 would still carry a part of 4 g."""
 
 
 class RestingPose(Protocol):
@@ -111,6 +112,7 @@ class Simulation:
         self._T_world_hand = PARKED
         self._opening = gripper.max_opening
         self._jaw_force = 0.0
+        self._empty_jaw_speed = 0.0
         self._T_motion_error = make_transform()
         self._hand_center, self._hand_half = _bounding_box(gripper)
         self._next_look_ns = 0
@@ -254,7 +256,7 @@ class Simulation:
     @property
     def jaw_speed(self) -> float:
         """True speed of a jaw, closing positive [m/s]."""
-        return self._world.jaw_speed if self._world else 0.0
+        return self._world.jaw_speed if self._world else self._empty_jaw_speed
 
     @property
     def grip_force(self) -> float:
@@ -286,7 +288,8 @@ class Simulation:
     def _drift_empty_jaws(self, seconds: float) -> None:
         direction = float(np.sign(self._jaw_force))
         moved = self._opening - 2.0 * direction * self.settings.closing_speed * seconds
-        self._opening = float(np.clip(moved, 0.0, self.gripper.max_opening))
+        before, self._opening = self._opening, float(np.clip(moved, 0.0, self.gripper.max_opening))
+        self._empty_jaw_speed = 0.5 * (before - self._opening) / seconds
 
     @property
     def _bounding_sphere(self) -> tuple[FloatArray, float]:

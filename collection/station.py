@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Self
 
-from pydantic import BaseModel, ConfigDict, InstanceOf
+from pydantic import BaseModel, ConfigDict, Field, InstanceOf
 
 from collection.clock import Clock, SimulatedClock, WallClock
 from collection.drivers import (
@@ -69,10 +69,10 @@ class PoseErrorConfig(_Section):
         actuation_rotation: [rad].
     """
 
-    calibration_translation: float = Field(8e-4, ge=0)
-    calibration_rotation: float = Field(1e-3, ge=0)
-    actuation_translation: float = Field(5e-4, ge=0)
-    actuation_rotation: float = Field(2e-3, ge=0)
+    calibration_translation: float = Field(default=8e-4, ge=0)
+    calibration_rotation: float = Field(default=1e-3, ge=0)
+    actuation_translation: float = Field(default=5e-4, ge=0)
+    actuation_rotation: float = Field(default=2e-3, ge=0)
 
     def total(self) -> PoseError:
         """Calibration and actuation together, as an error of the object's pose."""

@@ -9,6 +9,7 @@ import numpy as np
 from collection.cameras.cell_view import CellView
 from collection.cameras.protocol import CameraState
 from collection.cameras.sensor_noise import SENSOR_MODELS, spoil
+from collection.cameras.simulated_color import SimulatedColorCamera
 from collection.cameras.simulated_config import SimulatedCameraConfig
 from collection.drivers import BuildContext
 from collection.errors import CameraNotConnectedError, CameraTimeoutError
@@ -116,7 +117,10 @@ class SimulatedDepthCamera:
 
 
 def build(config: SimulatedCameraConfig, context: BuildContext) -> SimulatedDepthCamera:
-    """Build the camera in the station's simulated cell."""
+    """Build the camera in the station's simulated cell, and the one that films it."""
+    model = context.shared.get("arm_model")
+    if config.video and model is not None:
+        context.shared["color_camera"] = SimulatedColorCamera(simulated_cell(context), model)
     return SimulatedDepthCamera(config, simulated_cell(context), context.seed)
 
 

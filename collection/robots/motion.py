@@ -63,6 +63,19 @@ def reachable_grasps(
     return result
 
 
+def can_execute(
+    arm: Arm, T_world_gripper: FloatArray, settings: MotionSettings | None = None
+) -> bool:
+    """Whether a trial's dry run would pass from where the arm is: what an operator wants to know."""
+    if not reachable_grasps(arm, T_world_gripper, settings)[0]:
+        return False
+    try:
+        dry_run(arm, T_world_gripper, settings)
+    except RobotError:
+        return False
+    return True
+
+
 def dry_run(arm: Arm, T_world_gripper: FloatArray, settings: MotionSettings | None = None) -> None:
     """Check the whole way of a trial from where the arm is, before anything moves.
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 
 import numpy as np
@@ -13,7 +14,7 @@ from collection.robots.inverse_kinematics import CollisionCheck, LineFollower
 from collection.robots.protocol import Path, RobotDescription, Waypoint
 from collection.robots.reach_search import solve_many, start_configurations
 from collection.robots.yumi_arm import JOINT_NAMES, YumiArm, link_name
-from reach.arrays import BoolArray, FloatArray, frozen
+from reach.arrays import BoolArray, FloatArray
 from reach.gripper import ParallelJawGripper
 from reach.transforms import inverse
 
@@ -29,6 +30,10 @@ class JointPath:
 
     joints: FloatArray
     shares: FloatArray
+
+    def reversed(self) -> JointPath:
+        """The same way back."""
+        return JointPath(self.joints[::-1], 1.0 - self.shares[::-1])
 
 
 class ArmPlanner:
@@ -51,9 +56,9 @@ class ArmPlanner:
         self.arm = arm
         self._T_world_base = T_world_base
         self._T_base_world = inverse(T_world_base)
-        self._model = arm_model(arm, gripper, T_world_base, table_height)
-        self._follower = LineFollower(self._model, arm.home)
-        self._collisions = CollisionCheck(self._model)
+        self.model = arm_model(arm, gripper, T_world_base, table_height)
+        self._follower = LineFollower(self.model, arm.home)
+        self._collisions = CollisionCheck(self.model)
         self._starts = start_configurations(arm.chain, arm.home, FURTHER_STARTS, seed=0)
 
     @property
@@ -67,8 +72,8 @@ class ArmPlanner:
             upper=chain.upper,
             max_speed=chain.max_speed,
             home=self.arm.home,
-            shapes=self._model.shapes,
-            mjcf=self._model.mjcf,
+            shapes=self.model.shapes,
+            mjcf=self.model.mjcf,
         )
 
     def forward(self, joints: FloatArray) -> FloatArray:
@@ -138,27 +143,51 @@ class ArmPlanner:
             UnreachableError: a waypoint, or a point of a line to it, is out of reach.
             UnsafeMotionError: every way there touches something.
         """
-        if not waypoints:
-            return []
-        first, rest = waypoints[0], waypoints[1:]
-        failure: RobotError = UnreachableError(f"waypoint {first.name!r} is out of reach")
-        for path in self._ways(first, start):
-            try:
-                if isinstance(path, RobotError):
-                    raise path
-                return [path, *self.plan(rest, path.joints[-1])]
-            except RobotError as error:
-                failure = error
+        paths: list[JointPath] = []
+        for chain in _chains(waypoints):
+            paths += self._plan_chain(chain, paths[-1].joints[-1] if paths else start)
+        return paths
+
+    def _plan_chain(self, chain: Sequence[Waypoint], start: FloatArray) -> list[JointPath]:
+        """Paths along one chain: to its first pose in joint space, then line by line.
+
+        The branch is chosen at one pose of the chain and followed both ways; if that fails for
+        every branch, at another pose: what is hardest to reach decides best.
+        """
+        if chain[0].path is Path.LINEAR:
+            return self._lines(chain, start)
+        failure: RobotError | None = None
+        for anchor in range(len(chain)):
+            reached = False
+            for joints in self.configurations(chain[anchor].T_world_gripper, start):
+                reached = True
+                try:
+                    return self._through(chain, anchor, joints, start)
+                except RobotError as error:
+                    failure = failure or error
+            if not reached:
+                raise UnreachableError(f"waypoint {chain[anchor].name!r} is out of reach")
+        assert failure is not None  # every pose was reached, no way through all was free
         raise failure
 
-    def _ways(self, waypoint: Waypoint, start: FloatArray) -> Iterator[JointPath | RobotError]:
-        """The paths to one waypoint worth trying, and why others are none."""
-        T = waypoint.T_world_gripper
-        if waypoint.path is Path.LINEAR:
-            yield _attempt(lambda: self.line_path(T, start), waypoint)
-            return
-        for end in self.configurations(T, start):
-            yield _attempt(lambda end=end: self.joint_path(start, end), waypoint)
+    def _through(
+        self, chain: Sequence[Waypoint], anchor: int, joints: FloatArray, start: FloatArray
+    ) -> list[JointPath]:
+        """Paths along a chain that pass a configuration (J,) at one of its poses."""
+        back = self._lines(list(reversed(chain[:anchor])), joints)
+        first = back[-1].joints[-1] if back else joints
+        onward = self._lines(chain[anchor + 1 :], joints)
+        with _named(chain[0]):
+            to_first = self.joint_path(start, first)
+        return [to_first, *(path.reversed() for path in reversed(back)), *onward]
+
+    def _lines(self, waypoints: Sequence[Waypoint], start: FloatArray) -> list[JointPath]:
+        paths: list[JointPath] = []
+        for waypoint in waypoints:
+            with _named(waypoint):
+                paths.append(self.line_path(waypoint.T_world_gripper, start))
+            start = paths[-1].joints[-1]
+        return paths
 
     def _refuse_contacts(self, path: JointPath) -> None:
         for joints in path.joints:
@@ -167,12 +196,20 @@ class ArmPlanner:
                 raise UnsafeMotionError(f"the motion would bring {pair[0]} to {pair[1]}")
 
 
-def _attempt(make: object, waypoint: Waypoint) -> JointPath | RobotError:
+def _chains(waypoints: Sequence[Waypoint]) -> list[list[Waypoint]]:
+    """Runs of waypoints that one choice of branch must serve: a joint motion and its lines."""
+    chains: list[list[Waypoint]] = []
+    for waypoint in waypoints:
+        if not chains or waypoint.path is Path.JOINT:
+            chains.append([])
+        chains[-1].append(waypoint)
+    return chains
+
+
+@contextmanager
+def _named(waypoint: Waypoint) -> Iterator[None]:
+    """Say which waypoint an error is about."""
     try:
-        path: JointPath = make()  # type: ignore[operator]
+        yield
     except RobotError as error:
-        return type(error)(f"waypoint {waypoint.name!r}: {error}")
-    return path
-
-
-__all__ = ["ArmPlanner", "JointPath", "frozen"]
+        raise type(error)(f"waypoint {waypoint.name!r}: {error}") from error

@@ -24,5 +24,6 @@ def build(
         make_transform(None, config.base),
         simulation.workspace.table_height,
     )
+    context.shared["arm_model"] = planner.model
     controller = SimulatedController(simulation)
     return SimulatedArm(planner, controller), SimulatedGripper(controller)

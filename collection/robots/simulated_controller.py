@@ -98,7 +98,7 @@ class SimulatedController:
             motors_on=not emergency,
             automatic=True,
             emergency_stop=emergency,
-            error=str(self._error) if self._error else None,
+            error=str(self._error) if self._error else "stopped" if self._stop.is_set() else None,
         )
 
     def _emergency(self) -> bool:

@@ -79,7 +79,8 @@ class GraspWorld:
     def opening(self) -> float:
         """Distance of the pads' undeformed faces [m]."""
         travel = float(self._data.qpos[self._built.finger_qpos].mean())
-        return max(0.0, self.gripper.max_opening - 2.0 * travel)
+        opening = self.gripper.max_opening - 2.0 * travel
+        return min(max(0.0, opening), self.gripper.max_opening)
 
     @property
     def jaw_speed(self) -> float:

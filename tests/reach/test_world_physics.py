@@ -148,7 +148,9 @@ def test_random_trials_hold_numbers_only() -> None:
         poses = np.array(
             [
                 inverse(T_world_object)
-                @ from_above(rng.uniform(0.015, 0.035), rng.uniform(-0.03, 0.03), rng.uniform(-3, 3))
+                @ from_above(
+                    rng.uniform(0.015, 0.035), rng.uniform(-0.03, 0.03), rng.uniform(-3, 3)
+                )
                 @ exp(rng.normal(0.0, [0.05] * 3 + [0.004] * 3))
                 for _ in range(per_object)
             ]
