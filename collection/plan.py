@@ -115,7 +115,16 @@ def repeat_plan(plan: Plan, repeats: int, *, seed: int, session: int) -> Plan:
         raise PlanError(f"session is {session}, expected more than the plan's {plan.session}")
     first = 1 + max(trial.repeat for trial in plan.trials)
     trials = _ordered_trials(plan.grasps, range(first, first + repeats), seed, session)
-    return plan.model_copy(update={"seed": seed, "session": session, "trials": trials})
+    # Not model_copy: it would carry the old plan's cached hash along.
+    return Plan(
+        seed=seed,
+        session=session,
+        gripper=plan.gripper,
+        options=plan.options,
+        objects=plan.objects,
+        grasps=plan.grasps,
+        trials=trials,
+    )
 
 
 def _check(objects: Sequence[GraspObject], grasps: int, repeats: int) -> None:

@@ -61,8 +61,10 @@ def sample_over_poses(
         options: limits of the search.
 
     Raises:
-        NoGraspError: no pose gives any grasp.
+        NoGraspError: no pose gives any grasp, or there is no pose.
     """
+    if not poses:
+        raise NoGraspError(f"{obj.name!r} has no stable pose as probable as asked for")
     searches: dict[int, SampleResult] = {}
 
     def found(pose: StablePose, number: int) -> int:

@@ -3,13 +3,17 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from reach.arrays import FloatArray, IntArray
+from reach.cache import cache_key, cached_arrays
 from reach.objects import GraspObject
 from reach.raycast import RaycastScene
 
+VERSION = 1
 MAX_FACES = 20_000
 TARGET_FACES = 10_000
 MAX_DEVIATION = 3e-4
@@ -32,25 +36,24 @@ def planning_mesh(obj: GraspObject) -> PlanningMesh:
     """
     if len(obj.faces) <= MAX_FACES:
         return PlanningMesh(obj.vertices, obj.faces)
-    vertices, faces = _decimated(obj)
-    deviation = max(
-        RaycastScene(vertices, faces).distance(obj.vertices).max(),
-        RaycastScene(obj.vertices, obj.faces).distance(vertices).max(),
-    )
-    if deviation > MAX_DEVIATION:
+    key = cache_key("planning mesh", VERSION, TARGET_FACES, obj.content_hash)
+    light = cached_arrays("planning_mesh", key, lambda: _decimated(obj))
+    deviation_mm = float(light["deviation"]) * 1e3
+    if light["deviation"] > MAX_DEVIATION:
         note = (
             f"{obj.name}: planned on all {len(obj.faces)} faces, because a lighter mesh would be "
-            f"{deviation * 1e3:.2f} mm off"
+            f"{deviation_mm:.2f} mm off"
         )
         return PlanningMesh(obj.vertices, obj.faces, note)
     note = (
-        f"{obj.name}: planned on {len(faces)} of its {len(obj.faces)} faces "
-        f"(at most {deviation * 1e3:.2f} mm off), scored on all of them"
+        f"{obj.name}: planned on {len(light['faces'])} of its {len(obj.faces)} faces "
+        f"(at most {deviation_mm:.2f} mm off), scored on all of them"
     )
-    return PlanningMesh(vertices, faces, note)
+    return PlanningMesh(light["vertices"], light["faces"], note)
 
 
-def _decimated(obj: GraspObject) -> tuple[FloatArray, IntArray]:
+def _decimated(obj: GraspObject) -> dict[str, NDArray[Any]]:
+    """A mesh of about TARGET_FACES faces, and the largest distance between the surfaces."""
     import open3d
 
     mesh = open3d.geometry.TriangleMesh(
@@ -58,4 +61,10 @@ def _decimated(obj: GraspObject) -> tuple[FloatArray, IntArray]:
         open3d.utility.Vector3iVector(np.array(obj.faces, dtype=np.int32)),
     )
     light = mesh.simplify_quadric_decimation(TARGET_FACES)
-    return np.asarray(light.vertices), np.asarray(light.triangles).astype(np.int64)
+    vertices = np.asarray(light.vertices)
+    faces = np.asarray(light.triangles).astype(np.int64)
+    deviation = max(
+        RaycastScene(vertices, faces).distance(obj.vertices).max(),
+        RaycastScene(obj.vertices, obj.faces).distance(vertices).max(),
+    )
+    return {"vertices": vertices, "faces": faces, "deviation": np.array(deviation)}

@@ -122,6 +122,8 @@ def test_a_further_session_adds_new_grasps_and_trials(parts, plan):
 def test_a_further_session_can_repeat_the_same_grasps(plan):
     more = repeat_plan(plan, 2, seed=9, session=1)
     assert more.grasps == plan.grasps
+    assert more.content_hash != plan.content_hash
+    assert Plan.from_json(more.to_json()) == more
     assert Counter(t.repeat for t in more.trials) == {3: 18, 4: 18}
     assert not {t.trial_id for t in more.trials} & {t.trial_id for t in plan.trials}
     with pytest.raises(PlanError, match="session"):
@@ -190,6 +192,8 @@ def test_what_cannot_be_planned_is_refused(parts):
         make_plan([], YUMI, seed=0)
     with pytest.raises(PlanError, match="repeats is 0"):
         make_plan(parts, YUMI, repeats=0, seed=0)
+    with pytest.raises(NoGraspError, match="no stable pose"):
+        make_plan(parts[1:2], YUMI, seed=0, min_probability=0.9)
     crate = trimesh.creation.box((0.2, 0.2, 0.2))
     big = GraspObject("crate", crate.vertices, crate.faces, 1.0)
     with pytest.raises(NoGraspError, match="cannot hold 'crate'"):

@@ -251,7 +251,8 @@ def test_distance_knows_no_left_and_right_jaw():
     assert grasp_distance(T_a, shifted, CENTER) == pytest.approx(0.005)
 
 
-def test_a_scan_is_planned_on_fewer_faces_and_says_so():
+def test_a_scan_is_planned_on_fewer_faces_and_says_so(tmp_path, monkeypatch):
+    monkeypatch.setenv("REACH_CACHE", str(tmp_path))
     ball = trimesh.creation.icosphere(6, radius=0.018)
     part = GraspObject("scan", ball.vertices, ball.faces, 0.01)
     assert len(part.faces) > 80_000
