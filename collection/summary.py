@@ -56,7 +56,7 @@ def summary_table(rows: Iterable[SummaryRow], *, simulated: bool) -> Table:
     title = "Simulated trials: labels and outcomes come from MuJoCo" if simulated else None
     table = Table(title=title, title_justify="left")
     table.add_column("object")
-    for heading in ("trials", "success", *models):
+    for heading in ("trials", "success", *(name.replace("-", "\n") for name in models)):
         table.add_column(heading, justify="right")
     for row in rows:
         if row.name == "all":

@@ -192,7 +192,7 @@ def _capture(attempt: _Attempt, recorder: TrialRecorder) -> DepthFrame:
     recorder.camera(mapping.camera_record(frame), frame.time_ns)
     recorder.depth(mapping.depth_image(frame))
     if frame.color is not None:
-        recorder.color(frame.time_ns, frame.color)
+        recorder.color(frame.time_ns, frame.color, camera=mapping.DEPTH_CAMERA)
     return frame
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib
+import re
 import sys
 from collections.abc import Sequence
 
@@ -65,12 +66,24 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except ReachError as error:
         return _complain(str(error), 2)
     except typer.TyperException as error:
-        return _complain(error.format_message(), 2)
+        given = sys.argv[1:] if arguments is None else arguments
+        return _complain(_naming_the_value(error.format_message(), given), 2)
     except (typer.Abort, KeyboardInterrupt):
         return _complain("interrupted", 130)
     except BrokenPipeError:
         return 0  # the reader of our output (head, less) has seen enough
     return result if isinstance(result, int) else 0
+
+
+def _naming_the_value(message: str, arguments: Sequence[str]) -> str:
+    """Add what was typed: the parser's own message names the option only."""
+    option = re.match(r"Invalid value for '(?:-\w', '|-\w / )?(--[\w-]+)'", message)
+    if option is None:
+        return message
+    following = dict(zip(arguments, arguments[1:], strict=False))
+    joined = {a.partition("=")[0]: a.partition("=")[2] for a in arguments if "=" in a}
+    typed = {**joined, **following}.get(option[1])
+    return message if typed is None or typed in message else f"{message} (given: {typed})"
 
 
 def _complain(message: str, code: int) -> int:

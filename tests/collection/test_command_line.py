@@ -1,0 +1,106 @@
+"""Bad input gets one clear line, exit code 2, and nothing is written; help is fast."""
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+import trimesh
+
+from collection.cli.main import COMMANDS, main
+
+REACH = Path(sys.executable).with_name("reach")
+
+
+def refused(capsys, *arguments):
+    assert main(list(map(str, arguments))) == 2
+    err = capsys.readouterr().err
+    assert err.startswith("error: ")
+    assert err.count("\n") == 1, err
+    return err
+
+
+def collect(out, **options):
+    given = {"objects": "cube_3cm", "grasps": "1", "repeats": "1", "operator": "auto"} | options
+    words = [w for k, v in given.items() for w in (f"--{k.replace('_', '-')}", str(v))]
+    return ["collect", *words, "--out", out]
+
+
+@pytest.mark.parametrize(
+    ("options", "named"),
+    [
+        ({"objects": "cubee"}, ["cubee", "bracket"]),
+        ({"objects": "nowhere.stl"}, ["nowhere.stl"]),
+        ({"objects": ""}, ["--objects", "cube_3cm"]),
+        ({"station": "mars"}, ["mars", "simulated"]),
+        ({"operator": "robot"}, ["robot", "'auto', 'web' or 'terminal'"]),
+        ({"grasps": "0"}, ["--grasps", "0"]),
+        ({"grasps": "many"}, ["many"]),
+        ({"accept_change": "calibration"}, ["--resume"]),
+    ],
+)
+def test_bad_input_is_refused_in_one_line(capsys, tmp_path, options, named):
+    out = tmp_path / "S"
+    line = refused(capsys, *collect(out, **options))
+    for word in named:
+        assert word in line
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_an_existing_folder_is_not_written_to(capsys, tmp_path):
+    (tmp_path / "kept").write_text("mine")
+    line = refused(capsys, *collect(tmp_path))
+    assert "--resume" in line or "exists" in line
+    assert [p.name for p in tmp_path.iterdir()] == ["kept"]
+
+
+def test_a_cube_of_thirty_meters_is_taken_for_millimeters(capsys, tmp_path):
+    mesh = tmp_path / "cube.stl"
+    trimesh.creation.box((30, 30, 30)).export(mesh)
+    assert "--mesh-unit mm" in refused(capsys, *collect(tmp_path / "S", objects=mesh))
+
+
+def test_a_part_that_no_jaw_can_hold_is_refused_with_the_reason(capsys, tmp_path):
+    mesh = tmp_path / "block.stl"
+    trimesh.creation.box((0.09, 0.09, 0.09)).export(mesh)
+    line = refused(capsys, *collect(tmp_path / "S", objects=mesh))
+    assert "block" in line
+    assert not (tmp_path / "S").exists()
+
+
+def test_an_open_mesh_is_refused(capsys, tmp_path):
+    mesh = tmp_path / "open.stl"
+    box = trimesh.creation.box((0.03, 0.03, 0.03))
+    box.update_faces([True] * 6 + [False] * 6)
+    box.export(mesh)
+    assert "watertight" in refused(capsys, *collect(tmp_path / "S", objects=mesh))
+
+
+@pytest.mark.parametrize("command", ["status", "replay", "recover"])
+def test_no_session_there(capsys, tmp_path, command):
+    assert "session" in refused(capsys, command, tmp_path / "nothing")
+
+
+def test_unknown_commands_and_options(capsys):
+    assert "fly" in refused(capsys, "fly")
+    assert "--wings" in refused(capsys, "status", "--wings")
+
+
+def test_help_names_every_command(capsys):
+    assert main(["--help"]) == 0
+    told = capsys.readouterr().out
+    assert all(name in told for name in COMMANDS)
+
+
+@pytest.mark.parametrize("arguments", [["--help"], ["status", "--help"]])
+def test_help_imports_nothing_heavy(arguments):
+    heavy = ["numpy", "open3d", "trimesh", "rerun", "pandas", "numba", "mujoco", "matplotlib"]
+    code = (
+        "import sys; from collection.cli.main import main; main(sys.argv[1:]);"
+        f"print('HEAVY', [m for m in {heavy} if m in sys.modules])"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", code, *arguments], capture_output=True, text=True, env=os.environ
+    )
+    assert "HEAVY []" in done.stdout

@@ -1,0 +1,188 @@
+"""One real simulated session, run as a user runs it, and everything that must be true of it."""
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+from collection.cli.main import main
+from logs.events import Executed, Labelled, Scored, Source
+from logs.journal import read_journal
+from logs.session import SessionFolder
+from logs.trial_record import read_record
+
+REACH = Path(sys.executable).with_name("reach")
+OBJECTS, GRASPS, REPEATS = "cube_3cm,bracket", 2, 1
+MODELS = {"reach", "reach-robust", "point", "point-robust", "ellipse", "ellipse-robust"}
+
+
+def command(out, *extra):
+    return [
+        "collect", "--station", "simulated", "--objects", OBJECTS, "--grasps", str(GRASPS),
+        "--repeats", str(REPEATS), "--operator", "auto", "--seed", "11", "--out", str(out),
+        "--no-report", *extra,
+    ]  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def session(tmp_path_factory):
+    out = tmp_path_factory.mktemp("sessions") / "S"
+    done = subprocess.run(
+        [REACH, *command(out, "--json")], capture_output=True, text=True, timeout=280
+    )
+    assert done.returncode == 0, done.stderr
+    return out, json.loads(done.stdout)
+
+
+def test_every_planned_trial_is_labelled_and_scored(session):
+    out, summary = session
+    planned = 2 * GRASPS * REPEATS
+    assert summary["planned"] == summary["labelled"] == planned
+    assert summary["unlabelled"] == 0
+    assert summary["simulated"] is True
+    total = summary["objects"][-1]
+    assert total["trials"] == planned
+    assert set(total["predictions"]) == MODELS
+    assert all(0 <= value <= 1 for value in total["predictions"].values())
+
+
+def test_labels_are_marked_as_simulated_and_follow_execution(session):
+    out, _ = session
+    entries = read_journal(SessionFolder.open(out).journal_path)
+    executed = {e.event.trial_id: e.seq for e in entries if isinstance(e.event, Executed)}
+    labels = [e for e in entries if isinstance(e.event, Labelled)]
+    assert labels
+    for entry in labels:
+        assert entry.event.source is Source.OPERATOR_SIM
+        assert entry.event.blind
+        assert executed[entry.event.trial_id] < entry.seq
+
+
+def test_no_prediction_existed_before_its_label(session):
+    out, _ = session
+    entries = read_journal(SessionFolder.open(out).journal_path)
+    labelled = {e.event.trial_id: e.seq for e in entries if isinstance(e.event, Labelled)}
+    scores = [e for e in entries if isinstance(e.event, Scored)]
+    assert len(scores) == len(labelled) * len(MODELS)
+    assert all(labelled[e.event.trial_id] < e.seq for e in scores)
+
+
+def test_records_hold_the_whole_trial(session):
+    out, _ = session
+    for trial in SessionFolder.open(out).read_state().order:
+        record = read_record((out / trial.valid_take.record).parent)
+        assert record.complete
+        assert record.executed
+        assert record.descriptor.trial_id == trial.trial_id
+        assert record.descriptor.simulated
+        assert record.registration is not None
+        assert record.execution is not None
+        assert len(record.depth) == 1
+        assert len(record.jaw.time_ns) > 50
+        assert {"object.ply", "gripper.json", "robot.json", "station.toml"} <= set(
+            record.attachments
+        )
+        error = record.execution.measurements["true_registration_error_translation"]
+        assert 0 < error < 5e-3, "registration found the object where it is"
+        assert (out / trial.valid_take.record).with_name("trial.rrd").exists()
+
+
+def test_the_jaws_close_and_the_sensors_agree_with_the_label_mostly(session):
+    out, _ = session
+    state = SessionFolder.open(out).read_state()
+    agree = [
+        trial.valid_take.sensor.lifted == (trial.label.outcome == "success")
+        for trial in state.order
+    ]
+    assert sum(agree) >= len(agree) - 1  # two verdicts, two instruments
+
+
+def test_status_tells_the_same_as_the_journal(session, capsys):
+    out, _ = session
+    assert main(["status", str(out), "--json"]) == 0
+    status = json.loads(capsys.readouterr().out)
+    assert status["planned"] == status["labelled"] == status["done"]
+    assert status["disk_left"] > 0
+
+
+def test_resuming_a_finished_session_changes_no_trial(session):
+    out, _ = session
+    before = SessionFolder.open(out).read_state()
+    assert main(["collect", "--resume", "--out", str(out), "--no-report", "--json"]) == 0
+    after = SessionFolder.open(out).read_state()
+    assert [t.label for t in after.order] == [t.label for t in before.order]
+
+
+def test_the_same_seed_plans_and_places_the_same(session, tmp_path):
+    out, _ = session
+    again = tmp_path / "again"
+    process = subprocess.Popen(
+        [REACH, *command(again)], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL
+    )
+    try:
+        wait_for(lambda: executed_records(again), process)
+    finally:
+        process.kill()
+        process.wait()
+    assert (again / "plan.json").read_text() == (out / "plan.json").read_text()
+    one = executed_records(again)[0]
+    first, second = read_record((again / one).parent), read_record((out / one).parent)
+    assert first.descriptor.seed == second.descriptor.seed
+    assert (first.depth[0].depth == second.depth[0].depth).sum() > 0.9 * first.depth[0].depth.size
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("kills", [int(os.environ.get("REACH_KILLS", "3"))])
+def test_killed_anywhere_the_session_loses_nothing(session, tmp_path, kills):
+    """SIGKILL at moments spread over the session; then the rest runs through."""
+    reference, _ = session
+    out = tmp_path / "killed"
+    labels: dict[str, object] = {}
+    for n in range(kills):
+        arguments = command(out) if not out.exists() else ["collect", "--resume", "--out", str(out)]
+        process = subprocess.Popen(
+            [REACH, *arguments], stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True
+        )
+        # Moments differ from run to run: some fall into planning, some into motion or scoring.
+        deadline = time.monotonic() + 6 + 5 * n
+        while time.monotonic() < deadline and process.poll() is None:
+            process.poll()
+            time.sleep(0.05)
+        process.send_signal(signal.SIGKILL)
+        process.wait()
+        if not out.exists():
+            continue
+        kept = {t.trial_id: t.label for t in SessionFolder.open(out).read_state().order if t.label}
+        for trial_id, label in labels.items():
+            assert kept[trial_id] == label, "a stored label was lost or changed"
+        labels = kept
+    arguments = ["collect", "--resume", "--out", str(out), "--no-report", "--json"]
+    if not out.exists():
+        arguments = command(out, "--json")
+    done = subprocess.run([REACH, *arguments], capture_output=True, text=True, timeout=280)
+    assert done.returncode == 0, done.stderr
+    assert json.loads(done.stdout)["unlabelled"] == 0
+    assert (out / "plan.json").read_text() == (reference / "plan.json").read_text()
+    final = {t.trial_id: t.label for t in SessionFolder.open(out).read_state().order}
+    for trial_id, label in labels.items():
+        assert final[trial_id] == label
+
+
+def executed_records(out):
+    if not (out / "session.json").exists():
+        return []
+    entries = read_journal(SessionFolder.open(out).journal_path)
+    return [e.event.record for e in entries if isinstance(e.event, Executed)]
+
+
+def wait_for(condition, process, seconds=200):
+    deadline = time.monotonic() + seconds
+    while not condition():
+        assert process.poll() is None, "the session ended early"
+        assert time.monotonic() < deadline, "nothing happened in time"
+        time.sleep(0.1)
