@@ -20,6 +20,8 @@ HELD_TIME = 1.0
 """How long it must stay so [s]."""
 ROTATED_ANGLE = np.radians(10.0)
 """Turned in the grasp by more than this is `rotated` [rad]."""
+RISEN = 5e-4
+"""A hand this far above its lowest point has begun to lift [m]."""
 LOWERING = 0.030
 """A hand this far below its highest point is putting the object down [m]."""
 
@@ -90,9 +92,9 @@ class Watcher:
         return self._sights[: last + 1]
 
     def _turned(self, raised: list[_Sight]) -> float:
-        """Angle between the object at the last sight on the table and at the end."""
-        on_table = [sight for sight in raised if sight.clearance < 1e-3]
-        start = (on_table or raised)[-1 if on_table else 0]
+        """Angle in the grasp between the last sight before the hand rose, and the end."""
+        bottom = min(sight.hand_height for sight in raised)
+        start = [sight for sight in raised if sight.hand_height < bottom + RISEN][-1]
         relative = inverse(start.T_gripper_object) @ raised[-1].T_gripper_object
         return rotation_angle(relative[:3, :3])
 
