@@ -10,29 +10,33 @@ import rerun.blueprint as rrb
 from logs import view_colors as colors
 from logs import view_panels as panels
 from logs.trial_record import TrialRecord
-from logs.view_contacts import CONTACTS
-from logs.view_scene import OBJECT, WORLD
+from logs.view_contacts import CONTACT_ANCHOR, CONTACTS, SHOWN_CONTACTS
+from logs.view_scene import OBJECT, SCENE_ANCHOR, WORLD
 from logs.view_stage import ELAPSED
 from reach.arrays import FloatArray
 
 SCENE_EYE = np.array([0.33, -0.42, 0.27])
 """From the object to the scene's eye: beside the table, looking down at the hand [m]."""
-CONTACT_EYE = np.array([1.0, -1.3, 0.8])
-"""Direction from the object to the eye that looks at the contacts."""
+CONTACT_EYE = np.array([0.062, -0.08, 0.049])
+"""From an object of unit size to the eye that looks at its contacts; see the anchor's scale."""
 
 
-def trial_blueprint(record: TrialRecord, model: str | None, diameter: float) -> Any:
+def trial_blueprint(record: TrialRecord) -> Any:
     """Everything that is known of a trial.
 
-    Args:
-        record: the trial.
-        model: whose contacts are shown, if any.
-        diameter: of the object [m].
+    The viewer keeps the first layout it gets for all recordings of an application, so nothing
+    here depends on where an object lies, how large it is, or which model scored it: the views
+    look from anchors that each recording places.
     """
-    pictures = _pictures(record)
-    if model is not None:
-        pictures.append(_contacts(record, model, diameter))
-    return _layout(record, pictures, "label and scores")
+    contacts = rrb.Spatial3DView(
+        origin=CONTACT_ANCHOR,
+        name="predicted contact",
+        contents=[f"{OBJECT}/glass", f"{SHOWN_CONTACTS}/**"],
+        background=colors.BACKGROUND,
+        line_grid=rrb.LineGrid3D(visible=False),
+        eye_controls=_eye(CONTACT_EYE, (0.0, 0.0, 0.0)),
+    )
+    return _layout(record, [*_pictures(record), contacts], "label and scores")
 
 
 def blind_blueprint(record: TrialRecord) -> Any:
@@ -41,20 +45,19 @@ def blind_blueprint(record: TrialRecord) -> Any:
 
 
 def _layout(record: TrialRecord, pictures: list[Any], text_name: str) -> Any:
-    scene: Any = _scene(record)
+    scene: Any = _scene()
     left = rrb.Vertical(scene, rrb.Horizontal(*pictures), row_shares=[5, 3]) if pictures else scene
+    plots = _plots(record)
+    events = rrb.TextLogView(
+        origin=panels.EVENTS,
+        name="events",
+        columns=rrb.TextLogColumns(text_log_columns=["loglevel", "body"]),
+    )
     right = rrb.Vertical(
         rrb.TextDocumentView(origin=panels.SUMMARY, name=text_name),
-        *_plots(record),
-        rrb.Tabs(
-            rrb.TextLogView(
-                origin=panels.EVENTS,
-                name="events",
-                columns=rrb.TextLogColumns(text_log_columns=["loglevel", "body"]),
-            ),
-            rrb.StateTimelineView(origin=panels.PHASE, name="phases"),
-        ),
-        row_shares=[5] + [2] * len(_plots(record)) + [2],
+        *plots,
+        rrb.Tabs(events, rrb.StateTimelineView(origin=panels.PHASE, name="phases")),
+        row_shares=[5] + [2] * len(plots) + [2],
     )
     return rrb.Blueprint(
         rrb.Horizontal(left, right, column_shares=[5, 3]),
@@ -66,43 +69,28 @@ def _layout(record: TrialRecord, pictures: list[Any], text_name: str) -> Any:
     )
 
 
-def _scene(record: TrialRecord) -> Any:
-    target = _object_position(record) + (0.0, 0.0, 0.07)
+def _scene() -> Any:
     return rrb.Spatial3DView(
-        origin=WORLD,
+        origin=SCENE_ANCHOR,
         name="scene",
         contents=[
-            "$origin/**",
+            f"{WORLD}/**",
             f"- {WORLD}/rivals/**",
             f"- {OBJECT}/glass/**",
             f"- {CONTACTS}/**",
         ],
         background=colors.BACKGROUND,
         line_grid=rrb.LineGrid3D(visible=False),
-        eye_controls=rrb.EyeControls3D(
-            kind=rrb.Eye3DKind.Orbital,
-            position=target + SCENE_EYE,
-            look_target=target,
-            eye_up=(0, 0, 1),
-        ),
+        eye_controls=_eye(SCENE_EYE, (0.0, 0.0, 0.07)),
     )
 
 
-def _contacts(record: TrialRecord, model: str, diameter: float) -> Any:
-    """The object as glass with a model's patches, in the object's own frame."""
-    eye = CONTACT_EYE / np.linalg.norm(CONTACT_EYE) * max(2.2 * diameter, 0.05)
-    return rrb.Spatial3DView(
-        origin=OBJECT,
-        name=f"contact predicted by {model}",
-        contents=[f"{OBJECT}/glass", f"{CONTACTS}/{model}/**"],
-        background=colors.BACKGROUND,
-        line_grid=rrb.LineGrid3D(visible=False),
-        eye_controls=rrb.EyeControls3D(
-            kind=rrb.Eye3DKind.Orbital,
-            position=eye,
-            look_target=(0, 0, 0),
-            eye_up=(0, 0, 1),
-        ),
+def _eye(position: FloatArray, target: tuple[float, float, float]) -> Any:
+    return rrb.EyeControls3D(
+        kind=rrb.Eye3DKind.Orbital,
+        position=position,
+        look_target=target,
+        eye_up=(0, 0, 1),
     )
 
 
@@ -128,9 +116,3 @@ def _plots(record: TrialRecord) -> list[Any]:
             )
         )
     return shown
-
-
-def _object_position(record: TrialRecord) -> FloatArray:
-    found = record.registration
-    T = found.T_world_object if found else record.descriptor.T_world_object
-    return np.array(T[:3, 3])

@@ -4,16 +4,13 @@ from __future__ import annotations
 
 from pathlib import Path
 
-import numpy as np
-
 from logs.annotation_files import read_annotations
 from logs.annotations import Annotations
 from logs.trial_folder import BLIND_VIEW_NAME, VIEW_NAME, annotation_paths
 from logs.trial_record import TrialRecord, read_record, record_path
 
 APPLICATION = "reach-trials trial"
-DEFAULT_EXTENT = (0.03, 0.03, 0.03)
-"""Of an object whose mesh the record lacks [m]."""
+BLIND_APPLICATION = "reach-trials blind trial"
 
 
 def derive_rrd(folder: Path, out: Path | None = None, *, blind: bool = False) -> Path:
@@ -63,26 +60,24 @@ def _write(
 ) -> None:
     """Draw a record and its annotations into a file."""
     from logs.blueprint import blind_blueprint, trial_blueprint
-    from logs.view_contacts import model_with_contacts, show_contacts
+    from logs.view_contacts import show_contacts
     from logs.view_file import view_file
     from logs.view_panels import show_panels
-    from logs.view_scene import object_triangles, show_scene
+    from logs.view_scene import object_diameter, show_scene
     from logs.view_stage import Stage
 
     described = record.descriptor
-    scores = annotations.newest_scores
-    if blind:
-        layout = blind_blueprint(record)
-    else:
-        triangles = object_triangles(record)
-        extent = DEFAULT_EXTENT if triangles is None else np.ptp(triangles, axis=(0, 1))
-        layout = trial_blueprint(record, model_with_contacts(scores), float(np.linalg.norm(extent)))
-    name = f"{described.trial_id}-{described.take}"
-    with view_file(APPLICATION, name, path, layout, time_ns) as recording:
+    layout = blind_blueprint(record) if blind else trial_blueprint(record)
+    # The viewer merges recordings of one id, and keeps one layout for an application: a blind
+    # view must share neither with the full one.
+    application, suffix = (BLIND_APPLICATION, "-blind") if blind else (APPLICATION, "")
+    recording_id = f"{described.trial_id}-{described.take}{suffix}"
+    with view_file(application, recording_id, path, layout, time_ns) as recording:
         recording.send_recording_name(_name(record, annotations))
         stage = Stage(recording, described.time_ns)
         show_scene(stage, record, blind=blind)
-        show_contacts(stage, scores)
+        if not blind:
+            show_contacts(stage, annotations.newest_scores, object_diameter(record))
         show_panels(stage, record, annotations, blind=blind)
 
 

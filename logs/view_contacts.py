@@ -11,6 +11,12 @@ from logs.view_scene import OBJECT, flat_mesh
 from logs.view_stage import Stage
 
 CONTACTS = f"{OBJECT}/contacts"
+SHOWN_CONTACTS = f"{CONTACTS}/shown"
+"""Contacts of the model that the view shows first."""
+CONTACT_ANCHOR = f"{OBJECT}/eye"
+"""From here the contacts are looked at: scaled so that every object looks as large."""
+UNIT_DIAMETER = 0.052
+"""Diagonal that an object seems to have in the anchor's frame [m]."""
 PROUD = 2e-4
 """Patches stand off the surface by this, so that they are not drawn inside it [m]."""
 FORCE_SCALE = 0.002
@@ -18,12 +24,21 @@ FORCE_SCALE = 0.002
 PREFERRED = "reach"
 
 
-def show_contacts(stage: Stage, scores: dict[str, ScoreRecord]) -> None:
-    """Draw the contacts that each model predicts, in the object's frame."""
+def show_contacts(stage: Stage, scores: dict[str, ScoreRecord], diameter: float) -> None:
+    """Draw the contacts that each model predicts, in the object's frame.
+
+    Args:
+        stage: where.
+        scores: newest score of each model.
+        diameter: of the object [m].
+    """
+    first = model_with_contacts(scores)
+    stage.static(CONTACT_ANCHOR, rr.Transform3D(scale=diameter / UNIT_DIAMETER))
     for model, score in scores.items():
         highest = highest_pressure(score)
+        entity = SHOWN_CONTACTS if model == first else f"{CONTACTS}/others/{model}"
         for number, patch in enumerate(score.patches):
-            _show_patch(stage, f"{CONTACTS}/{model}/jaw_{patch.jaw}_{number}", patch, highest)
+            _show_patch(stage, f"{entity}/jaw_{patch.jaw}_{number}", patch, highest)
 
 
 def model_with_contacts(scores: dict[str, ScoreRecord]) -> str | None:

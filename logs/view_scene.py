@@ -30,6 +30,8 @@ Show = Callable[..., None]
 """Draws archetypes at an entity."""
 WORLD = "world"
 OBJECT = f"{WORLD}/object"
+SCENE_ANCHOR = f"{WORLD}/eye"
+"""From here the scene is looked at: where the object was found."""
 TRUTH_FRAME = "object_truth"
 """Frame of a simulated object's true pose; never part of a blind view."""
 CLOUD_POINTS = 60_000
@@ -42,6 +44,9 @@ OPENED_AGAIN = 2e-3
 def show_scene(stage: Stage, record: TrialRecord, *, blind: bool) -> None:
     """Draw everything that stands or moves in the world."""
     stage.static(WORLD, rr.ViewCoordinates.RIGHT_HAND_Z_UP)
+    found = record.registration
+    T_world_object = found.T_world_object if found else record.descriptor.T_world_object
+    stage.static(SCENE_ANCHOR, rr.Transform3D(translation=T_world_object[:3, 3]))
     _show_table(stage, record)
     gripper = recorded_gripper(record)
     if GRIPPER_FRAME not in record.frames:
@@ -198,6 +203,12 @@ def object_triangles(record: TrialRecord) -> FloatArray | None:
         return None
     vertices, faces = read_mesh(attached.data)
     return vertices[faces]
+
+
+def object_diameter(record: TrialRecord) -> float:
+    """Diagonal of the object's bounding box [m]; a plausible one if no mesh is attached."""
+    triangles = object_triangles(record)
+    return 0.05 if triangles is None else float(np.linalg.norm(np.ptp(triangles, axis=(0, 1))))
 
 
 def object_track(record: TrialRecord) -> tuple[IntArray, FloatArray]:

@@ -70,8 +70,8 @@ def read_view(path: Path) -> tuple[set[str], str]:
 def test_everything_of_the_trial_is_shown(take: Path) -> None:
     entities, text = read_view(derive_rrd(take))
     expected = {
-        "/world/table", "/world/object/mesh", "/world/object/contacts/reach/jaw_0_0/pressure",
-        "/world/object/contacts/reach/jaw_1_1/force", "/world/hand", "/world/hand/jaw_0/pad",
+        "/world/table", "/world/object/mesh", "/world/object/contacts/shown/jaw_0_0/pressure",
+        "/world/object/contacts/shown/jaw_1_1/force", "/world/hand", "/world/hand/jaw_0/pad",
         "/world/robot/base/cylinder_0", "/world/robot/wrist", "/world/planned_pads",
         "/world/cameras/depth", "/world/cloud", "/world/rivals/0", "/images/depth/depth",
         "/images/color/color", "/plots/width", "/plots/force", "/plots/joints/joint_1", "/events",
