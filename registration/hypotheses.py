@@ -8,16 +8,17 @@ import numpy as np
 
 from reach.arrays import FloatArray
 from reach.stable_poses import StablePose
-from reach.transforms import rotation_about
+from reach.transforms import make_transform, rotation_about
 from registration.mesh_model import MeshModel
 from registration.observation import Observation
 from registration.render_check import render, visible_centroids
 
 YAWS = 72
 """Turns about the table's normal tried for each stable pose."""
+PLACINGS = 3
 START_PIXELS = 18
 """Resolution at which starts are rendered: pixels across the part's diameter."""
-ROTATIONS = 1200
+ROTATIONS = 1600
 """Orientations tried when the part may lie in any way."""
 
 
@@ -64,6 +65,22 @@ def free_starts(center: FloatArray) -> FloatArray:
     return starts
 
 
+def turned_over(T: FloatArray, center: FloatArray) -> FloatArray:
+    """Poses (N, 4, 4) turned by quarter and half turns about the object's axes, (N * 9, 4, 4).
+
+    Args:
+        T: poses in any frame, shape (N, 4, 4).
+        center: point of the object that stays in place, shape (3,), object frame [m].
+    """
+    result = []
+    for pose in T:
+        for axis in np.eye(3):
+            for quarter in (1, 2, 3):
+                turn = rotation_about(axis, quarter * np.pi / 2)
+                result.append(pose @ make_transform(turn, center - turn @ center))
+    return np.stack(result)
+
+
 def put_where_seen(
     model: MeshModel,
     seen: Observation,
@@ -88,13 +105,14 @@ def put_where_seen(
         The shifted starts, shape (N, 4, 4).
     """
     stride = _stride(model, seen, float(centroid_camera[2]))
-    rendered = render(model, seen, T_camera_object, seen.rays(stride), stride)
-    centroids = visible_centroids(rendered, seen.rays(stride), T_camera_object[:, :3, 3])
-    shift = centroid_camera - centroids
-    if slide is not None:
-        shift = shift - (shift * slide).sum(axis=1)[:, None] * slide
     result = T_camera_object.copy()
-    result[:, :3, 3] += shift
+    for _ in range(PLACINGS):  # what hides the part changes as it moves
+        rendered = render(model, seen, result, seen.rays(stride), stride)
+        centroids = visible_centroids(seen, rendered, stride, result[:, :3, 3])
+        shift = centroid_camera - centroids
+        if slide is not None:
+            shift = shift - (shift * slide).sum(axis=1)[:, None] * slide
+        result[:, :3, 3] += shift
     return result
 
 

@@ -16,6 +16,7 @@ from reach.arrays import FloatArray
 from reach.transforms import exp
 from registration.job import Job
 from registration.polish import Polished, polish
+from registration.resting import nearest_stable_pose, stood_up
 from registration.search import FREE, Hypothesis
 
 NEAR = 0.06
@@ -50,7 +51,37 @@ def refine(job: Job, found: Sequence[Hypothesis], declared: int | None) -> list[
     return sorted(result, key=lambda hypothesis: hypothesis.cost)
 
 
+def standing(job: Job, hypothesis: Hypothesis) -> Hypothesis:
+    """A freely found pose set into the stable pose that it is close to, if it is to one."""
+    T = hypothesis.T_camera_object
+    index, tilt = nearest_stable_pose(T, job.table.normal_camera, job.poses, job.sym)
+    if index is None or tilt > job.options.max_tilt:
+        return hypothesis
+    T = stood_up(
+        T,
+        job.table.normal_camera,
+        job.table.offset_camera,
+        job.poses[index],
+        job.sym,
+        job.model.hull_vertices,
+    )
+    cost = float(hypothesis.search.check(T[None]).cost[0])
+    return replace(hypothesis, T_camera_object=T, stable_pose=index, cost=cost)
+
+
 def _refined(job: Job, start: Hypothesis) -> Hypothesis:
+    """Refine; a freely found pose may stand on the table after all, which then holds it."""
+    refined = _improved(job, start)
+    if start.stable_pose != FREE:
+        return refined
+    stood = standing(job, refined)
+    if stood.stable_pose == FREE:
+        return refined
+    stood = _improved(job, replace(stood, polished=None))
+    return stood if stood.cost < refined.cost + 0.01 else refined
+
+
+def _improved(job: Job, start: Hypothesis) -> Hypothesis:
     fitted = _fitted(job, start)
     settled = _settle(fitted, job.table.normal_camera, job.obj.com, job.table.noise)
     if settled.cost > fitted.cost - GAIN:

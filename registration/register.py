@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import Literal, get_args
 
 import numpy as np
@@ -99,8 +98,7 @@ def _search(job: Job, mode: str, declared: int | None) -> list[Hypothesis]:
     if not _explains(job, found) and mode != "free":
         found += job.parted_components("part components")
     if not _explains(job, found):
-        anywhere = job.anywhere("search" if mode == "free" else "free search")
-        found += anywhere if mode == "free" else [_settled(job, h) for h in anywhere]
+        found += job.anywhere("search" if mode == "free" else "free search")
     found.sort(key=lambda hypothesis: hypothesis.cost)
     if not _explains(job, found):
         raise NoGoodPoseError(
@@ -109,16 +107,6 @@ def _search(job: Job, mode: str, declared: int | None) -> list[Hypothesis]:
             "wrong object, clutter, or a moved camera"
         )
     return found
-
-
-def _settled(job: Job, hypothesis: Hypothesis) -> Hypothesis:
-    """A freely found pose under the name of the stable pose that it is close to."""
-    index, tilt = nearest_stable_pose(
-        hypothesis.T_camera_object, job.table.normal_camera, job.poses, job.sym
-    )
-    if index is None or tilt > job.options.max_tilt:
-        return hypothesis
-    return replace(hypothesis, stable_pose=index)
 
 
 def _explains(job: Job, found: list[Hypothesis]) -> bool:
@@ -131,7 +119,7 @@ def _report(job: Job, decision: Decision, mode: str) -> Registration:
     T_camera_object = chosen.T_camera_object
     index, tilt = nearest_stable_pose(T_camera_object, up, job.poses, job.sym)
     if chosen.stable_pose == FREE:
-        leaning = not tilt <= job.options.max_tilt
+        leaning = index is None or tilt > job.options.max_tilt
         if leaning and mode != "free":
             raise TiltedPoseError(
                 f"{job.obj.name!r} stands {np.degrees(tilt):.0f} deg off its nearest stable pose "

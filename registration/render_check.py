@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from reach.arrays import FloatArray, IntArray
 from reach.transforms import inverse
 from registration.mesh_model import MeshModel
-from registration.observation import NO_RETURN, PART, Observation
+from registration.observation import NO_RETURN, PART, TABLE, Observation
 
 SHADOW_WEIGHT = 0.1
 """Weight of a pixel of the part without a return: shadows and grazing faces are common."""
@@ -24,6 +24,8 @@ HIDDEN_WEIGHT = 0.15
 """Weight of a pixel of the part that something else hides."""
 GRAZING = 0.3
 """Depth residuals count along the surface normal, but never less than this share of them."""
+NEAR_TABLE = 4e-3
+"""A predicted depth this close to the table's was cut away with it [m]."""
 _COLUMNS = 9
 
 
@@ -75,15 +77,25 @@ def render(
     return Rendered(boxes, *_cast(model, rays, T_camera_object, boxes))
 
 
-def visible_centroids(rendered: Rendered, rays: FloatArray, default: FloatArray) -> FloatArray:
+def visible_centroids(
+    seen: Observation, rendered: Rendered, stride: int, default: FloatArray
+) -> FloatArray:
     """Mean of the points seen of each hypothesis, shape (N, 3), camera frame [m].
 
+    Where the image has no return (a shadow) the part's points would not have been observed
+    either, nor so low above the table that they were cut away with it; such pixels are left out.
+
     Args:
-        rendered: at the rays.
-        rays: shape (h, w, 3), camera frame.
+        seen: the image's window.
+        rendered: hypotheses, at a stride.
+        stride: of the rendered pixels.
         default: what to return for a hypothesis out of the image, shape (N, 3).
     """
-    result: FloatArray = _visible_centroids(rendered.boxes, rendered.depth, rays, default)
+    labels = np.ascontiguousarray(seen.labels[::stride, ::stride])
+    depth = np.ascontiguousarray(seen.depth[::stride, ::stride])
+    result: FloatArray = _visible_centroids(
+        rendered.boxes, rendered.depth, seen.rays(stride), labels, depth, default
+    )
     return result
 
 
@@ -179,7 +191,12 @@ def _fill_rays(
 
 @njit(cache=True, nogil=True)
 def _visible_centroids(
-    boxes: IntArray, depth: NDArray[np.float32], rays: FloatArray, default: FloatArray
+    boxes: IntArray,
+    depth: NDArray[np.float32],
+    rays: FloatArray,
+    labels: NDArray[np.int16],
+    observed: FloatArray,
+    default: FloatArray,
 ) -> FloatArray:
     result = default.copy()
     at = 0
@@ -189,7 +206,9 @@ def _visible_centroids(
             for u in range(boxes[h, 2], boxes[h, 3]):
                 d = depth[at]
                 at += 1
-                if np.isfinite(d):
+                label = labels[v, u]
+                cut_away = label == TABLE and abs(observed[v, u] - d) < NEAR_TABLE
+                if np.isfinite(d) and label != NO_RETURN and not cut_away:
                     x += d * rays[v, u, 0]
                     y += d * rays[v, u, 1]
                     z += d

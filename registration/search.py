@@ -11,7 +11,7 @@ from reach.arrays import FloatArray, IntArray
 from reach.stable_poses import StablePose
 from reach.transforms import inverse
 from registration.alignment import align_planar, align_rigid
-from registration.hypotheses import free_starts, planar_starts, put_where_seen
+from registration.hypotheses import free_starts, planar_starts, put_where_seen, turned_over
 from registration.mesh_model import MeshModel
 from registration.observation import Observation
 from registration.options import SensorProfile
@@ -22,6 +22,9 @@ from registration.render_check import RenderCheck, render_check
 COARSE_POINTS, FINE_POINTS = 220, 1500
 KEPT_QUICK, KEPT_RENDERED = 14, 6
 """Hypotheses kept after the quick check and after the low-resolution render check."""
+KEPT_QUICK_FREE, KEPT_RENDERED_FREE = 32, 10
+TURNED_OVER = 2
+"""So many of a free search's best hypotheses are also tried turned over."""
 COARSE_PIXELS, FINE_PIXELS = 500, 5000
 """Pixels of the part that a render check looks at, about."""
 COARSE_STEPS, FINE_STEPS = 12, 6
@@ -81,11 +84,20 @@ class Search:
 
     def anywhere(self) -> list[Hypothesis]:
         """Search all orientations, table or not."""
-        starts = free_starts(self.model.obj.com)
-        return self._run(starts, np.full(len(starts), FREE), planar=False)
+        com = self.model.obj.com
+        starts = free_starts(com)
+        found = self._run(starts, np.full(len(starts), FREE), planar=False)
+        # A nearly symmetric part's other poses lie half and quarter turns away.
+        best = np.stack([hypothesis.T_camera_object for hypothesis in found[:TURNED_OVER]])
+        starts = _lift(inverse(self._T_camera_table()), turned_over(best, com))
+        found += self._run(starts, np.full(len(starts), FREE), planar=False)
+        return sorted(found, key=lambda hypothesis: hypothesis.cost)
+
+    def _T_camera_table(self) -> FloatArray:
+        return self.seen.table.T_camera_table(self.seen.points.mean(axis=0))
 
     def _run(self, starts: FloatArray, names: IntArray, *, planar: bool) -> list[Hypothesis]:
-        T_camera_table = self.seen.table.T_camera_table(self.seen.points.mean(axis=0))
+        T_camera_table = self._T_camera_table()
         T_table_camera = inverse(T_camera_table)
         points = _transform(T_table_camera, self.seen.points)
         coarse, fine = _subset(points, COARSE_POINTS), _subset(points, FINE_POINTS)
@@ -104,10 +116,11 @@ class Search:
         )
         if not planar:
             score = score + self._below_table(T)
-        kept = self._distinct(T, score, KEPT_QUICK)
+        kept = self._distinct(T, score, KEPT_QUICK if planar else KEPT_QUICK_FREE)
         T, names = T[kept], names[kept]
         check = self._render(_lift(T_camera_table, T), COARSE_PIXELS)
-        order = np.argsort(check.cost, kind="stable")[:KEPT_RENDERED]
+        order = np.argsort(check.cost, kind="stable")
+        order = order[: KEPT_RENDERED if planar else KEPT_RENDERED_FREE]
         order = order[check.cost[order] <= check.cost[order[0]] + HOPELESS]
         T, _ = self._align(T[order], fine, self._fine_scales(), planar=planar)
         T_camera_object = _lift(T_camera_table, T)
