@@ -18,6 +18,8 @@ LINE_STEP, LINE_TURN = 0.010, 0.10
 LARGEST_JUMP = 0.35
 """A joint that moves further within one piece has changed the arm's branch [rad]."""
 TABLE_CLEARANCE, TABLE_HORIZON = 0.005, 0.05
+FINGERTIP_TOUCH = 2e-3
+"""A hand planned this far into the table only touches it: the guarded approach ends there [m]."""
 
 
 class LineFollower:
@@ -116,16 +118,20 @@ class CollisionCheck:
     def __init__(self, arm: ArmModel) -> None:
         self._model = arm.model
         self._data = mujoco.MjData(arm.model)
+        self._table = arm.model.geom("table").id
+        self._hand = {arm.model.geom(name).id for name in arm.hand_geoms}
 
     def touching(self, joints: FloatArray) -> tuple[str, str] | None:
         """The two geoms that touch in a configuration (J,), or None."""
         self._data.qpos[:] = joints
         mujoco.mj_kinematics(self._model, self._data)
         mujoco.mj_collision(self._model, self._data)
-        if self._data.ncon == 0:
-            return None
-        contact = self._data.contact[0]
-        return self._model.geom(contact.geom1).name, self._model.geom(contact.geom2).name
+        for contact in self._data.contact[: self._data.ncon]:
+            pair = (contact.geom1, contact.geom2)
+            fingertip_on_table = self._table in pair and not self._hand.isdisjoint(pair)
+            if not fingertip_on_table or contact.dist < -FINGERTIP_TOUCH:
+                return self._model.geom(pair[0]).name, self._model.geom(pair[1]).name
+        return None
 
 
 def _where(T: FloatArray) -> str:

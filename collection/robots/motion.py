@@ -178,7 +178,10 @@ def _run(
     with recorder.phase(Phase.APPROACH):
         move("approach", settings.transit())
     with recorder.phase(Phase.DESCEND):
-        move("grasp", settings.careful(), guarded=True)
+        try:
+            move("grasp", settings.careful(), guarded=True)
+        except CollisionStopError:
+            _accept_touch(arm, T_world_gripper, settings)
     with recorder.phase(Phase.CLOSE):
         T_closed, joints = arm.pose(), arm.joints()
         recorder.arm_rests(joints, T_closed)
@@ -205,6 +208,22 @@ def _run(
         end_ns=recorder.clock.now_ns(),
         put_down_early=put_down_early,
     )
+
+
+def _accept_touch(arm: Arm, T_world_gripper: FloatArray, settings: MotionSettings) -> None:
+    """A touch at the very end of the approach ends it there: fingertips met the table.
+
+    Raises:
+        CollisionStopError: further up, the way was blocked.
+    """
+    state = arm.state()
+    arm.clear_error()
+    missing = float(np.linalg.norm(arm.pose()[:3, 3] - T_world_gripper[:3, 3]))
+    if missing > settings.touch_distance:
+        raise CollisionStopError(
+            f"{state.error or 'a contact stopped the approach'}, {missing * 1e3:.1f} mm before"
+            " the grasp"
+        )
 
 
 def _shake(

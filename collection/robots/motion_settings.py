@@ -16,6 +16,8 @@ class MotionSettings(BaseModel):
         approach_distance: back along the approach axis, where the slow approach starts [m].
         lift_height: [m]; more than the 50 mm that count as lifted.
         hold_time: in the air [s]; at least the 1 s that counts as held.
+        touch_distance: a contact this near the grasp ends the approach there; fingertips may
+            meet the table where the registered pose errs by a millimeter [m].
         closing_force: [N].
         fast: speed of the transit [m/s].
         slow: speed of the approach and of putting the part down [m/s].
@@ -35,6 +37,7 @@ class MotionSettings(BaseModel):
     approach_distance: float = Field(default=0.075, gt=0, le=0.3)
     lift_height: float = Field(default=0.100, ge=0.06, le=0.4)
     hold_time: float = Field(default=1.0, ge=1.0, le=60)
+    touch_distance: float = Field(default=0.003, ge=0, le=0.01)
     closing_force: float = Field(default=20.0, gt=0)
     fast: float = Field(default=0.35, gt=0, le=1.5)
     slow: float = Field(default=0.06, gt=0, le=0.5)

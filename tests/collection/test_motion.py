@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 import trimesh
 
-from collection.errors import RobotError, UnreachableError
+from collection.errors import CollisionStopError, RobotError, UnreachableError
 from collection.robots.execution import Execution, Phase, PhaseEvent
 from collection.robots.motion import can_execute, dry_run, execute_grasp, reachable_grasps
 from collection.robots.motion_settings import MotionSettings
@@ -204,3 +204,19 @@ def test_a_trial_costs_less_than_the_time_it_simulates(station: Station) -> None
     spent = time.process_time() - start
     assert spent < 2.0
     assert (execution.end_ns - execution.start_ns) * 1e-9 > 3 * spent
+
+
+def test_fingertips_that_meet_the_table_end_the_approach_there(station: Station) -> None:
+    """A registered pose that errs downward by a millimeter or two voids no trial."""
+    T = place(station) @ make_transform(None, (0, 0, 0.0065))  # tips 1.5 mm below the table
+    execution = run(station, np.array(T))
+    assert station.simulation is not None
+    assert station.simulation.verdict().lifted
+    raised = execution.T_world_gripper[2, 3] - execution.T_world_gripper_planned[2, 3]
+    assert 0.0 < raised < 3e-3
+
+
+def test_an_approach_blocked_further_up_is_a_collision(station: Station) -> None:
+    T = place(station) @ make_transform(None, (0.028, 0, 0))
+    with pytest.raises(CollisionStopError, match="mm before the grasp"):
+        run(station, np.array(T))
