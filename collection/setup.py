@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from collection.errors import StationFileError
+from collection.calibration import calibration_of
 from collection.options import SessionOptions
 from collection.plan_records import Plan
 from collection.versions import git_commit, package_versions
@@ -123,13 +124,21 @@ def read_setup(folder: SessionFolder) -> Setup:
 
 
 def resolved_station(station: Station) -> dict[str, Any]:
-    """Every value of the station file, defaults included."""
+    """Every value of the station file, defaults included, and the camera's calibration.
+
+    Raises:
+        CalibrationError: the calibration file that the station names cannot be read.
+    """
     config = station.config
     sections = {
         name: section.model_dump(mode="json")
         for name, section in ((n, getattr(config, n)) for n in type(config).model_fields)
         if hasattr(section, "model_dump")
     }
+    # A calibration file's content, residuals included: its name may stay while it changes.
+    calibration = calibration_of(station.camera)
+    if calibration is not None:
+        sections["camera"]["calibrated"] = calibration.model_dump(mode="json")
     return {"name": config.name, **sections}
 
 
