@@ -83,7 +83,10 @@ def test_a_finger_wholly_inside_a_solid_is_a_hit():
 
 
 def test_a_box_askew_is_swept_in_steps():
-    turned = Box(make_transform(None, (0, 0, 0.1)) @ exp([0.0, 0.5, 0.0, 0, 0, 0]), np.array([0.004, 0.004, 0.02]))
+    turned = Box(
+        make_transform(None, (0, 0, 0.1)) @ exp([0.0, 0.5, 0.0, 0, 0, 0]),
+        np.array([0.004, 0.004, 0.02]),
+    )
     hand = ParallelJawGripper("stick", YUMI.jaws, 0.025, 20.0, 0.02, palm=(turned,))
     needle = trimesh.creation.box((0.02, 0.02, 0.02))
     needle.apply_translation([0, 0, 0.04])
