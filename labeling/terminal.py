@@ -40,6 +40,7 @@ class TerminalConsole(App[None]):
     #receipt.refused { background: darkgoldenrod; color: black; }
     #legend { padding: 0 2; height: auto; color: $text-muted; }
     """
+    AUTO_FOCUS = None  # the keys are the operator's, not the note's
     BINDINGS: ClassVar = [("ctrl+q", "quit", "leave")]
 
     def __init__(self, link: TerminalLink) -> None:
@@ -68,7 +69,6 @@ class TerminalConsole(App[None]):
 
     def on_mount(self) -> None:
         """Start to follow the server."""
-        self.set_focus(None)
         self.follow()
         self.set_interval(ALIVE_PERIOD, self._link.say_alive)
         self.set_interval(0.25, self.draw)

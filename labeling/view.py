@@ -46,19 +46,27 @@ def console_view(console: Console) -> View:
             "lights": {
                 name: {"ok": ok, "text": text} for name, (ok, text) in controller.lights.items()
             },
-            "counts": {name: getattr(counts, name) for name in counts.__slots__},
+            "counts": {
+                name: getattr(counts, name) for name in counts.__slots__ if name != "successes"
+            },
             "disk_left": controller.disk_left,
             "disk_low": controller.disk_low,
-            "success": success_by_object(state),
+            **_verdicts(console, state),
             "elapsed": (time.time_ns() - state.opened_ns) / 1e9 if state.opened_ns else None,
             "live_view": console.live_view.url if console.live_view else None,
             "second": console.second,
             "trial": _current(console, state),
-            "undoable": _undoable(state),
-            "history": _history(state),
+            "undoable": None if console.second else _undoable(state),
             "recent_commands": list(state.commands)[-REMEMBERED_COMMANDS:],
             "next": _upcoming(state),
         }
+
+
+def _verdicts(console: Console, state: SessionState) -> View:
+    """What was decided so far; nothing of it where it could sway who looks again."""
+    if console.mode == "review":
+        return {"success": {}, "history": []}
+    return {"success": success_by_object(state), "history": _history(state)}
 
 
 def overall_state(state: SessionState, *, closed: bool = False) -> str:

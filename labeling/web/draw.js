@@ -38,7 +38,9 @@ export function drawSession(view, alive) {
   text("count-unlabelled", counts.unlabelled);
   text("count-again", `${counts.redone} / ${counts.voided}`);
   text("count-skipped", counts.skipped);
-  text("count-success", counts.labelled ? `${Math.round((100 * counts.successes) / counts.labelled)} %` : "–");
+  const lifted = Object.values(view.success).reduce((sum, [good]) => sum + good, 0);
+  text("count-success", view.mode === "run" && counts.labelled ? `${Math.round((100 * lifted) / counts.labelled)} %` : "–");
+  show("stop", view.mode === "run");
   text("count-disk", view.disk_left === null ? "–" : view.disk_left > 9999 ? "> 9999" : view.disk_left);
   byId("disk").classList.toggle("low", view.disk_low);
   byId("progress").firstElementChild.style.width = `${(100 * counts.labelled) / Math.max(counts.planned, 1)}%`;

@@ -155,7 +155,7 @@ const ACTIONS = {
     return send({ kind, rev: page.view.control_rev }, `${kind}d`);
   },
   note: () => byId("note").focus(),
-  stop: () => send({ kind: "stop" }, "stopped"),
+  stop: () => page.view?.mode === "review" || send({ kind: "stop" }, "stopped"),
 };
 
 function choose(what) {

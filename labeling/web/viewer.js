@@ -1,4 +1,5 @@
 // The Rerun viewer alone on its page; keys that are the operator's go on to the console.
+/* global wasm_bindgen */
 
 const status = document.getElementById("status");
 // The console is the same server under its other name; nobody else may embed this page.
@@ -12,8 +13,8 @@ window.addEventListener("keydown", (event) => {
 }, { capture: true });
 
 try {
-  await window.wasm_bindgen({ module_or_path: "/viewer/re_viewer_bg.wasm" });
-  const handle = new window.wasm_bindgen.WebHandle({
+  await wasm_bindgen({ module_or_path: "/viewer/re_viewer_bg.wasm" });
+  const handle = new wasm_bindgen.WebHandle({
     url: new URLSearchParams(location.search).getAll("url"),
     hide_welcome_screen: true,
     panel_state_overrides: { top: "Hidden", blueprint: "Hidden", selection: "Hidden", time: "Collapsed" },

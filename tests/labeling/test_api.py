@@ -246,3 +246,12 @@ def test_a_key_press_is_stored_within_forty_milliseconds(
         seconds.append(time.perf_counter() - begun)
     # The slower half may be the machine's other work: the median shows the code.
     assert sorted(seconds)[50] < 0.04
+
+
+def test_a_review_shows_no_verdicts_beside_the_list(bench: Any, serve: Any, client_of: Any) -> None:
+    bench.labelled("failure", reason="missed").record_score("reach", "1", 0.987654, {})
+    client = client_of(serve(bench, mode="review", second=True))
+    view = client.get("/api/view")
+    assert "missed" not in view.text and "0.987" not in view.text
+    assert (view.json()["history"], view.json()["success"]) == ([], {})
+    assert view.json()["undoable"] is None
