@@ -7,7 +7,7 @@ import json
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Literal, Self
+from typing import TYPE_CHECKING, Literal, Protocol, Self, runtime_checkable
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
 
@@ -192,3 +192,26 @@ class CameraPose:
                 f" with fx {intrinsics.fx:.1f}: calibrate again"
             )
         return as_transform(calibration.T_world_camera, "T_world_camera")
+
+
+@runtime_checkable
+class CalibratedCamera(Protocol):
+    """A camera whose pose comes from a calibration file."""
+
+    @property
+    def pose(self) -> CameraPose:
+        """Where the camera stands."""
+        ...
+
+
+def calibration_of(camera: object) -> HandEyeCalibration | None:
+    """The calibration of a station's camera, with its residuals, to be kept with a session.
+
+    Returns:
+        None for a camera that has no calibration file (a simulated one, or frames that bring
+        their own pose).
+
+    Raises:
+        CalibrationError: the file that the station names is missing or no calibration.
+    """
+    return camera.pose.calibration if isinstance(camera, CalibratedCamera) else None

@@ -13,8 +13,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from collection.errors import StationFileError
 from collection.calibration import calibration_of
+from collection.errors import StationFileError
 from collection.options import SessionOptions
 from collection.plan_records import Plan
 from collection.versions import git_commit, package_versions

@@ -83,6 +83,21 @@ def read_frame(
         raise FrameFileError(f"{path.name}: {error}") from error
 
 
+def read_gripper_pose(path: Path) -> FloatArray:
+    """T_world_gripper (4, 4) of a .npz frame that was taken to calibrate.
+
+    Raises:
+        FrameFileError: the frame was taken for something else.
+    """
+    T = _read_npz(path).get("T_world_gripper")
+    if T is None:
+        raise FrameFileError(f"{path.name} has no T_world_gripper: where was the board?")
+    try:
+        return as_transform(T, "T_world_gripper")
+    except InvalidInputError as error:
+        raise FrameFileError(f"{path.name}: {error}") from error
+
+
 def write_frame(path: Path, frame: DepthFrame, **extra: Any) -> None:
     """Write a .npz frame; `extra` may add T_world_camera, T_world_gripper.
 

@@ -23,6 +23,8 @@ COMMANDS: dict[str, str] = {
     "sample": "sample",
     "score": "score",
     "objects": "objects",
+    "calibrate": "calibrate",
+    "doctor": "doctor",
 }
 """Command name -> module in collection.cli that holds a function of the same name."""
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Self
@@ -20,6 +20,7 @@ from collection.robots.protocol import (
     Speed,
     Waypoint,
 )
+from collection.robots.yumi.checks import controller_checks
 from collection.robots.yumi.diagnosis import not_ready
 from collection.robots.yumi.feedback import Feedback
 from collection.robots.yumi.link import ControllerLink
@@ -30,6 +31,7 @@ from reach.arrays import BoolArray, FloatArray
 from reach.transforms import as_transform, inverse, quat_wxyz_from_rotation
 
 if TYPE_CHECKING:
+    from collection.checkup import Check
     from collection.robots.planner import ArmPlanner, JointPath
 
 HOLDER = "the YuMi arm"
@@ -108,6 +110,15 @@ class YumiRobotArm:
             emergency_stop=state.motors.startswith("emergencystop"),
             error=str(reason) if reason else stopped,
         )
+
+    def observe(self) -> FloatArray:
+        """T_world_gripper (4, 4) in any mode, also while a person guides the arm."""
+        with self._link.session() as services:
+            return self._feedback.T_world_gripper(services)
+
+    def checks(self) -> Iterator[Check]:
+        """Look at the controller, for `reach doctor`; moves nothing."""
+        return controller_checks(self._link, self._feedback, lambda q: self._planner.forward(q))
 
     def joints(self) -> FloatArray:
         """Measured joints in kinematic order, shape (7,) [rad]."""

@@ -14,6 +14,7 @@ import numpy as np
 from collection.clock import NANOSECONDS
 from collection.errors import StaleReadingError
 from collection.robots.yumi.link import ControllerLink
+from collection.robots.yumi.web_services import WebServices
 from collection.robots.yumi_arm import CONTROLLER_ORDER, JOINT_NAMES
 from reach.arrays import FloatArray
 from reach.transforms import inverse, rotation_angle
@@ -45,16 +46,18 @@ class Feedback:
     ) -> None:
         self._link, self._T_world_base, self._forward = link, T_world_base, forward
 
-    def joints(self) -> FloatArray:
-        """Joints in kinematic order, shape (7,) [rad]."""
-        reported = np.radians(self._link.services.joints_deg(self._link.unit))
+    def joints(self, services: WebServices | None = None) -> FloatArray:
+        """Joints in kinematic order, shape (7,) [rad]; over a passing session if one is given."""
+        services = services or self._link.services
+        reported = np.radians(services.joints_deg(self._link.unit))
         joints = np.empty(len(CONTROLLER_ORDER))
         joints[list(CONTROLLER_ORDER)] = reported
         return joints
 
-    def T_world_gripper(self) -> FloatArray:
+    def T_world_gripper(self, services: WebServices | None = None) -> FloatArray:
         """The controller's own Cartesian reading, shape (4, 4)."""
-        pose: FloatArray = self._T_world_base @ self._link.services.T_base_tool(self._link.unit)
+        services = services or self._link.services
+        pose: FloatArray = self._T_world_base @ services.T_base_tool(self._link.unit)
         return pose
 
     def settle_joints(

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import re
 import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
 from importlib.resources import files
 
 from collection.clock import Clock
@@ -87,14 +89,25 @@ class ControllerLink:
         Raises:
             ConnectionLostError: the controller does not answer.
         """
+        with self.session() as services:
+            return services.state()
+
+    @contextmanager
+    def session(self) -> Iterator[WebServices]:
+        """The open session, or one for the moment: readings need no running program.
+
+        Raises:
+            ConnectionLostError: the controller does not answer.
+        """
         if self._holders:
-            return self.services.state()
-        session = self._session()
-        session.connect()
+            yield self.services
+            return
+        passing = self._session()
+        passing.connect()
         try:
-            return session.state()
+            yield passing
         finally:
-            session.close()
+            passing.close()
 
     def stop(self) -> None:
         """Stop all programs and with them all motion; nothing happens when disconnected.

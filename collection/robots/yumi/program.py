@@ -27,7 +27,8 @@ from collection.robots.yumi.messages import (
 from collection.robots.yumi.rapid_text import from_rapid
 from collection.robots.yumi.web_services import WebServices
 
-REQUEST, REPLY, VERSION, JAW = "reach_request", "reach_reply", "reach_version", "reach_jaw"
+REQUEST, REPLY, JAW = "reach_request", "reach_reply", "reach_jaw"
+VERSION, TOOL = "reach_version", "reach_tool"
 
 LOOKS_PER_STATE = 4
 """Looks at the reply for one at whether the program still runs."""
