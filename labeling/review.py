@@ -84,7 +84,7 @@ def models_scored(state: SessionState) -> tuple[str, ...]:
 
 
 def _margin_below(take: TakeState, limit: float) -> bool:
-    registration = take.info.get("registration")
+    registration = take.info.get("registration", take.info)
     margin = registration.get("margin") if isinstance(registration, dict) else None
     return isinstance(margin, (int, float)) and margin < limit
 
