@@ -132,5 +132,5 @@ def check_scores(scores: Mapping[str, FloatArray], count: int) -> None:
         bad = ~((values >= 0.0) & (values <= 1.0))
         if np.any(bad):
             raise InvalidInputError(
-                f"model {name!r} gave the score {values[bad][0]!r}, expected 0 to 1"
+                f"model {name!r} gave the score {float(values[bad][0])}, expected 0 to 1"
             )
