@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from reach.arrays import FloatArray, IntArray, frozen
 from reach.cache import cache_key, cached_arrays
 from reach.objects import GraspObject
+from reach.world.coacd_process import run_coacd
 
 VERSION = 1
 CONCAVITY = 0.05
@@ -49,12 +50,10 @@ def _decompose(obj: GraspObject) -> list[tuple[NDArray[Any], NDArray[Any]]]:
     hull = obj.mesh.convex_hull
     if obj.volume > (1.0 - NEARLY_CONVEX) * float(hull.volume):
         return [(np.asarray(hull.vertices), np.asarray(hull.faces))]
-    import coacd
-
-    coacd.set_log_level("error")
     scale = obj.diameter  # CoACD's thresholds are for parts of about unit size
-    parts = coacd.run_coacd(
-        coacd.Mesh(obj.vertices / scale, obj.faces.astype(np.int32)),
+    parts = run_coacd(
+        obj.vertices / scale,
+        obj.faces,
         threshold=CONCAVITY,
         max_convex_hull=MOST_PARTS,
         resolution=1000,
@@ -63,7 +62,7 @@ def _decompose(obj: GraspObject) -> list[tuple[NDArray[Any], NDArray[Any]]]:
         max_ch_vertex=64,
         seed=0,
     )
-    return [(np.asarray(v) * scale, np.asarray(f)) for v, f in parts]
+    return [(vertices * scale, faces) for vertices, faces in parts]
 
 
 def _packed(parts: list[tuple[NDArray[Any], NDArray[Any]]]) -> dict[str, NDArray[Any]]:
