@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import socket
+import sys
+
 import pytest
 from yumi_emulator import Arm, Controller, WebServices
 from yumi_emulator.language import parse_module
@@ -9,6 +12,7 @@ from yumi_emulator.language import parse_module
 from collection.clock import SimulatedClock
 from collection.errors import (
     ConnectionLostError,
+    MissingExtraError,
     MotorsOffError,
     NotConnectedError,
     NotInAutoError,
@@ -176,3 +180,21 @@ def test_sequence_numbers_stay_exact_in_single_precision() -> None:
     assert next_sequence(0) == 1
     assert next_sequence(LAST_SEQUENCE) == 1
     assert LAST_SEQUENCE < 2**23
+
+
+def test_a_controller_that_accepts_but_never_answers_is_a_lost_connection(
+    clock: SimulatedClock,
+) -> None:
+    with socket.create_server(("127.0.0.1", 0)) as silent:
+        address = "{}:{}".format(*silent.getsockname())
+        config = YumiConfig(driver="yumi", address=address, request_timeout=0.2)
+        with pytest.raises(ConnectionLostError, match="does not answer"):
+            ControllerLink(config, clock).connect("test")
+
+
+def test_without_the_extra_the_error_names_it(
+    config: YumiConfig, clock: SimulatedClock, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setitem(sys.modules, "abb_robot_client.rws", None)
+    with pytest.raises(MissingExtraError, match=r"reach-trials\[yumi\]"):
+        ControllerLink(config, clock).connect("test")
