@@ -29,7 +29,7 @@ from logs.recorder import TrialRecorder
 from logs.records import AttachmentRecord, ExitStatus
 from reach.arrays import FloatArray
 from reach.grasp import Grasp
-from registration.register import register
+from registration import register
 from registration.result import Registration
 
 if TYPE_CHECKING:

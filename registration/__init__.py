@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     from registration.errors import RegistrationError
     from registration.frame import DepthFrame, Intrinsics
     from registration.options import RegistrationOptions, SensorProfile
-    from registration.register import register
+    from registration.pipeline import register
     from registration.result import Registration, Rival
 
 _HOME = {
@@ -23,7 +23,7 @@ _HOME = {
     "RegistrationOptions": "registration.options",
     "Rival": "registration.result",
     "SensorProfile": "registration.options",
-    "register": "registration.register",
+    "register": "registration.pipeline",
 }
 
 __all__ = [

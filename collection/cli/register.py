@@ -53,7 +53,7 @@ def register(
     from collection.cloud_file import read_cloud
     from collection.objects import load_object
     from registration.picture import check_picture, save_picture
-    from registration.register import register as find
+    from registration import register as find
 
     if picture is not None:
         check_picture(picture)
