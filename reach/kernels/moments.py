@@ -19,6 +19,10 @@ TILT_STEPS = (0.9744, 0.7986, 0.4695)
 """Cosines of 13, 37 and 62 degrees: classes of tilt against the closing direction. Angles that
 parts have by design, such as 0, 30, 45, 60 and 90 degrees, lie well inside a class."""
 SECTORS = 8
+TAN_HALF_SECTOR = 0.41421356237309503
+SMALL = 0.5
+"""Triangles smaller than this share of a cell go uncut to the cell of their barycenter: each group
+keeps its exact force, center and second moments, so that only the grouping changes."""
 CLASSES = 1 + len(TILT_STEPS) * SECTORS
 GROUPS = CELLS * CELLS * CLASSES
 MOMENTS = 23
@@ -36,8 +40,20 @@ def normal_class(nx: float, ny: float, nz: float) -> int:
         ring = 1
     if nz < TILT_STEPS[2]:
         ring = 2
-    turn = np.arctan2(ny, nx) / (2.0 * np.pi) * SECTORS
-    return 1 + ring * SECTORS + int(np.floor(turn + 0.5)) % SECTORS
+    return 1 + ring * SECTORS + sector(nx, ny)
+
+
+@compiled
+def sector(x: float, y: float) -> int:
+    """Which of eight sectors of 45 degrees, centered on the axes and diagonals, holds a direction."""
+    u, v = abs(x), abs(y)
+    if v <= TAN_HALF_SECTOR * u:
+        return 0 if x >= 0.0 else 4
+    if u <= TAN_HALF_SECTOR * v:
+        return 2 if y >= 0.0 else 6
+    if x >= 0.0:
+        return 1 if y >= 0.0 else 7
+    return 3 if y >= 0.0 else 5
 
 
 @compiled
@@ -135,8 +151,8 @@ def add_moments(
 
 
 @compiled
-def _cell_of(value: float, low: float, size: float) -> int:
-    return min(CELLS - 1, max(0, int((value - low) / size)))
+def _cell_of(value: float, low: float, per_length: float) -> int:
+    return min(CELLS - 1, max(0, int((value - low) * per_length)))
 
 
 @compiled
@@ -190,20 +206,37 @@ def cell_moments(
             low_y, high_y = min(low_y, triangles[t, i, 1]), max(high_y, triangles[t, i, 1])
     size_x = max((high_x - low_x) / CELLS, 1e-9)
     size_y = max((high_y - low_y) / CELLS, 1e-9)
+    per_x, per_y = 1.0 / size_x, 1.0 / size_y
     strip, cell, spare = np.empty((12, 3)), np.empty((12, 3)), np.empty((12, 3))
     rows = 0
     for t in range(count):
         nx, ny, nz = normals[t, 0], normals[t, 1], normals[t, 2]
         kind = normal_class(nx, ny, nz)
+        xa, xb, xc = triangles[t, 0, 0], triangles[t, 1, 0], triangles[t, 2, 0]
+        ya, yb, yc = triangles[t, 0, 1], triangles[t, 1, 1], triangles[t, 2, 1]
+        x0, x1 = min(xa, xb, xc), max(xa, xb, xc)
+        y0, y1 = min(ya, yb, yc), max(ya, yb, yc)
+        if x1 - x0 <= SMALL * size_x and y1 - y0 <= SMALL * size_y:
+            first_x = last_x = _cell_of((xa + xb + xc) / 3.0, low_x, per_x)
+            first_y = last_y = _cell_of((ya + yb + yc) / 3.0, low_y, per_y)
+        else:
+            first_x, last_x = _cell_of(x0, low_x, per_x), _cell_of(x1, low_x, per_x)
+            first_y, last_y = _cell_of(y0, low_y, per_y), _cell_of(y1, low_y, per_y)
+        if first_x == last_x and first_y == last_y:
+            group = (first_x * CELLS + first_y) * CLASSES + kind
+            if sums[group, 22] == 0.0:
+                used[rows] = group
+                rows += 1
+            for i in range(3):
+                for axis in range(3):
+                    cell[i, axis] = triangles[t, i, axis]
+            add_moments(cell, 0, 1, 2, nx, ny, nz, high, sums, group)
+            if sums[group, 22] == 0.0:
+                rows -= 1
+            continue
         for i in range(3):
             for axis in range(3):
                 strip[i, axis] = triangles[t, i, axis]
-        x0, x1 = min(strip[0, 0], strip[1, 0]), max(strip[0, 0], strip[1, 0])
-        y0, y1 = min(strip[0, 1], strip[1, 1]), max(strip[0, 1], strip[1, 1])
-        first_x = _cell_of(min(x0, strip[2, 0]), low_x, size_x)
-        last_x = _cell_of(max(x1, strip[2, 0]), low_x, size_x)
-        first_y = _cell_of(min(y0, strip[2, 1]), low_y, size_y)
-        last_y = _cell_of(max(y1, strip[2, 1]), low_y, size_y)
         for ix in range(first_x, last_x + 1):
             n = 3
             if first_x < last_x:

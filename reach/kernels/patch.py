@@ -19,6 +19,7 @@ FACING = 1e-6
 NEVER = 1e30
 """Depth of contact of a pad that meets nothing."""
 STACK = 64
+OUTSIDE, CUT, INSIDE = 0, 1, 2
 POLYGON_ROOM = 24
 """Corners of a clipped triangle beyond those of the pad's outline: three, and two planes each way."""
 
@@ -49,20 +50,17 @@ def node_in_prism(
 
 
 @compiled
-def facing_triangle_in_pad(mesh: MeshTree, triangle: int, T: FloatArray, out: FloatArray) -> bool:
+def facing_triangle_in_pad(
+    c: FloatArray, n: FloatArray, triangle: int, T: FloatArray, out: FloatArray
+) -> bool:
     """Write a triangle's corners in the pad's frame; false if it turns away from the jaw."""
-    inward = mesh.inward
-    along = (
-        inward[triangle, 0] * T[0, 2]
-        + inward[triangle, 1] * T[1, 2]
-        + inward[triangle, 2] * T[2, 2]
-    )
+    along = n[triangle, 0] * T[0, 2] + n[triangle, 1] * T[1, 2] + n[triangle, 2] * T[2, 2]
     if along <= FACING:
         return False
     for corner in range(3):
-        dx = mesh.corners[triangle, corner, 0] - T[0, 3]
-        dy = mesh.corners[triangle, corner, 1] - T[1, 3]
-        dz = mesh.corners[triangle, corner, 2] - T[2, 3]
+        dx = c[triangle, corner, 0] - T[0, 3]
+        dy = c[triangle, corner, 1] - T[1, 3]
+        dz = c[triangle, corner, 2] - T[2, 3]
         for axis in range(3):
             out[corner, axis] = T[0, axis] * dx + T[1, axis] * dy + T[2, axis] * dz
     return True
@@ -76,6 +74,60 @@ def inside_outline(points: FloatArray, count: int, edges: FloatArray) -> bool:
             if edges[edge, 0] * points[i, 0] + edges[edge, 1] * points[i, 1] > edges[edge, 2]:
                 return False
     return True
+
+
+@compiled
+def place_triangle(
+    c: FloatArray,
+    n: FloatArray,
+    triangle: int,
+    T: FloatArray,
+    edges: FloatArray,
+    low: float,
+    high: float,
+    corners: FloatArray,
+) -> int:
+    """Say whether a facing triangle lies inside the prism, outside, or must be clipped.
+
+    Args:
+        c: corners of the mesh's sorted triangles, shape (F, 3, 3).
+        n: their inward normals, shape (F, 3).
+        triangle: index.
+        T: T_object_pad, shape (4, 4).
+        edges: half-planes of the pad's outline, shape (K, 3).
+        low: least depth [m].
+        high: greatest depth [m].
+        corners: receives the corners, pad frame, unless outside, shape (3, 3).
+    """
+    rxx, rxy, rxz = T[0, 0], T[0, 1], T[0, 2]
+    ryx, ryy, ryz = T[1, 0], T[1, 1], T[1, 2]
+    rzx, rzy, rzz = T[2, 0], T[2, 1], T[2, 2]
+    if n[triangle, 0] * rxz + n[triangle, 1] * ryz + n[triangle, 2] * rzz <= FACING:
+        return OUTSIDE
+    px, py, pz = T[0, 3], T[1, 3], T[2, 3]
+    ax, ay, az = c[triangle, 0, 0] - px, c[triangle, 0, 1] - py, c[triangle, 0, 2] - pz
+    bx, by, bz = c[triangle, 1, 0] - px, c[triangle, 1, 1] - py, c[triangle, 1, 2] - pz
+    cx, cy, cz = c[triangle, 2, 0] - px, c[triangle, 2, 1] - py, c[triangle, 2, 2] - pz
+    z0 = rxz * ax + ryz * ay + rzz * az
+    z1 = rxz * bx + ryz * by + rzz * bz
+    z2 = rxz * cx + ryz * cy + rzz * cz
+    if min(z0, z1, z2) >= high or max(z0, z1, z2) < low:
+        return OUTSIDE
+    x0, y0 = rxx * ax + ryx * ay + rzx * az, rxy * ax + ryy * ay + rzy * az
+    x1, y1 = rxx * bx + ryx * by + rzx * bz, rxy * bx + ryy * by + rzy * bz
+    x2, y2 = rxx * cx + ryx * cy + rzx * cz, rxy * cx + ryy * cy + rzy * cz
+    state = INSIDE if min(z0, z1, z2) >= low and max(z0, z1, z2) <= high else CUT
+    for edge in range(len(edges)):
+        u, v, limit = edges[edge, 0], edges[edge, 1], edges[edge, 2]
+        d0, d1, d2 = u * x0 + v * y0, u * x1 + v * y1, u * x2 + v * y2
+        if min(d0, d1, d2) > limit:
+            return OUTSIDE
+        if max(d0, d1, d2) > limit:
+            state = CUT
+    corners[0, 0], corners[0, 1], corners[0, 2] = x0, y0, z0
+    corners[1, 0], corners[1, 1], corners[1, 2] = x1, y1, z1
+    corners[2, 0], corners[2, 1], corners[2, 2] = x2, y2, z2
+    return state
 
 
 @compiled
@@ -133,13 +185,15 @@ def contact_depth(
         d_con [m], or NEVER.
     """
     best = NEVER
-    leaves = len(mesh.starts) - 1
+    # Plain arrays: a named tuple in a loop costs a reference count for each of its members.
+    mesh_corners, inward, boxes, starts = mesh.corners, mesh.inward, mesh.boxes, mesh.starts
+    leaves = len(starts) - 1
     stack = np.empty(STACK, np.int64)
     bounds = np.empty(STACK)
     corners = np.empty((3, 3))
     first = np.empty((len(edges) + POLYGON_ROOM, 3))
     second = np.empty((len(edges) + POLYGON_ROOM, 3))
-    stack[0], bounds[0] = 0, node_in_prism(mesh.boxes, 0, T, pad_box, low, high)
+    stack[0], bounds[0] = 0, node_in_prism(boxes, 0, T, pad_box, low, high)
     size = 1
     while size > 0:
         size -= 1
@@ -147,8 +201,8 @@ def contact_depth(
         if bounds[size] >= min(best, high):
             continue
         if node < leaves - 1:
-            left = node_in_prism(mesh.boxes, 2 * node + 1, T, pad_box, low, min(best, high))
-            right = node_in_prism(mesh.boxes, 2 * node + 2, T, pad_box, low, min(best, high))
+            left = node_in_prism(boxes, 2 * node + 1, T, pad_box, low, min(best, high))
+            right = node_in_prism(boxes, 2 * node + 2, T, pad_box, low, min(best, high))
             near, far = 2 * node + 1, 2 * node + 2
             if right < left:
                 near, far, left, right = far, near, right, left
@@ -160,8 +214,8 @@ def contact_depth(
                 size += 1
             continue
         leaf = node - (leaves - 1)
-        for triangle in range(mesh.starts[leaf], mesh.starts[leaf + 1]):
-            if not facing_triangle_in_pad(mesh, triangle, T, corners):
+        for triangle in range(starts[leaf], starts[leaf + 1]):
+            if not facing_triangle_in_pad(mesh_corners, inward, triangle, T, corners):
                 continue
             least = min(corners[0, 2], corners[1, 2], corners[2, 2])
             if least >= min(best, high):
@@ -203,7 +257,9 @@ def collect_patch(
         sorted mesh triangle that it is a piece of; both arrays may be longer than the number.
     """
     found = 0
-    leaves = len(mesh.starts) - 1
+    # Plain arrays: a named tuple in a loop costs a reference count for each of its members.
+    mesh_corners, inward, boxes, starts = mesh.corners, mesh.inward, mesh.boxes, mesh.starts
+    leaves = len(starts) - 1
     stack = np.empty(STACK, np.int64)
     corners = np.empty((3, 3))
     first = np.empty((len(edges) + POLYGON_ROOM, 3))
@@ -213,23 +269,20 @@ def collect_patch(
     while size > 0:
         size -= 1
         node = stack[size]
-        if node_in_prism(mesh.boxes, node, T, pad_box, low, high) == NEVER:
+        if node_in_prism(boxes, node, T, pad_box, low, high) == NEVER:
             continue
         if node < leaves - 1:
             stack[size], stack[size + 1] = 2 * node + 2, 2 * node + 1
             size += 2
             continue
         leaf = node - (leaves - 1)
-        for triangle in range(mesh.starts[leaf], mesh.starts[leaf + 1]):
-            if not facing_triangle_in_pad(mesh, triangle, T, corners):
+        for triangle in range(starts[leaf], starts[leaf + 1]):
+            state = place_triangle(mesh_corners, inward, triangle, T, edges, low, high, corners)
+            if state == OUTSIDE:
                 continue
-            least = min(corners[0, 2], corners[1, 2], corners[2, 2])
-            if least >= high:
-                continue
-            most = max(corners[0, 2], corners[1, 2], corners[2, 2])
-            if least >= low and most <= high and inside_outline(corners, 3, edges):
-                if found == len(owners):
-                    triangles, owners = _doubled(triangles, owners, 1)
+            if found + POLYGON_ROOM + len(edges) > len(owners):
+                triangles, owners = _doubled(triangles, owners, POLYGON_ROOM + len(edges))
+            if state == INSIDE:
                 for i in range(3):
                     for axis in range(3):
                         triangles[found, i, axis] = corners[i, axis]
@@ -237,8 +290,6 @@ def collect_patch(
                 found += 1
                 continue
             count = clip_to_prism(corners, edges, low, high, first, second)
-            if found + count > len(owners):
-                triangles, owners = _doubled(triangles, owners, count)
             for i in range(1, count - 1):
                 for axis in range(3):
                     triangles[found, 0, axis] = first[0, axis]

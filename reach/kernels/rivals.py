@@ -48,7 +48,7 @@ def first_hit(mesh: MeshTree, T: FloatArray, low: float, high: float) -> tuple[f
             size += 2
             continue
         for triangle in range(mesh.starts[node - leaves + 1], mesh.starts[node - leaves + 2]):
-            if not facing_triangle_in_pad(mesh, triangle, T, c):
+            if not facing_triangle_in_pad(mesh.corners, mesh.inward, triangle, T, c):
                 continue
             w0 = c[1, 0] * c[2, 1] - c[1, 1] * c[2, 0]
             w1 = c[2, 0] * c[0, 1] - c[2, 1] * c[0, 0]

@@ -106,15 +106,16 @@ def find_patch(
     count, triangles, owners = collect_patch(
         mesh, T_object_pad, edges, box, first, high, space.triangles, space.owners
     )
-    normals = space.normals
+    normals, inward = space.normals, mesh.inward
     if len(normals) < len(owners):
         normals = np.empty((len(owners), 3))
     for t in range(count):
+        owner = owners[t]
         for i in range(3):
             normals[t, i] = (
-                T_object_pad[0, i] * mesh.inward[owners[t], 0]
-                + T_object_pad[1, i] * mesh.inward[owners[t], 1]
-                + T_object_pad[2, i] * mesh.inward[owners[t], 2]
+                T_object_pad[0, i] * inward[owner, 0]
+                + T_object_pad[1, i] * inward[owner, 1]
+                + T_object_pad[2, i] * inward[owner, 2]
             )
     return (
         count,

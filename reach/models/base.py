@@ -22,8 +22,8 @@ from reach.kernels.tree import MeshTree, mesh_tree
 from reach.scene import GRAVITY, Scene
 from reach.transforms import ORTHONORMAL_TOLERANCE
 
-MARGIN_CAP = 100.0
-"""Margins are not sought beyond this many times gravity."""
+MARGIN_CAP = 10.0
+"""Margins are not sought beyond this many times gravity: what holds ten times the weight holds."""
 TORQUE_LENGTH = 0.03
 """Torques are divided by this length [m] to be compared with forces; the verdict does not depend
 on it."""

@@ -129,7 +129,7 @@ def test_exit_of_ray_does_not_depend_on_the_torque_scale(seed):
         scaled = np.concatenate([wrench[:3], wrench[3:] * LENGTH / length])
         margin, _ = exit_of_ray(*friction_columns(contacts, length), scaled, 50.0, 1e-4, 20000, 6)
         margins.append(margin)
-    np.testing.assert_allclose(margins, margins[1], rtol=5e-3, atol=2e-3)
+    np.testing.assert_allclose(margins, margins[1], rtol=5e-3, atol=5e-3)
 
 
 def peg(subdivisions):

@@ -60,7 +60,9 @@ def square_gripper(side=0.01):
 
 def test_flat_square_carries_twice_mu_times_the_closing_force():
     grasp = at()
-    verdict = AreaContact(friction=0.5).evaluate(scene_of(cube(mass=0.1), square_gripper()), grasp)
+    verdict = AreaContact(friction=0.5, margin_cap=100).evaluate(
+        scene_of(cube(mass=0.1), square_gripper()), grasp
+    )
     assert verdict.margin == pytest.approx(2 * 0.5 * grasp.force / (0.1 * GRAVITY), rel=2e-3)
     assert [patch.area for patch in verdict.patches] == pytest.approx([1e-4, 1e-4])
 
@@ -97,7 +99,7 @@ def test_compiled_torsion_of_a_square_is_within_one_percent_of_exact():
     mu, force, side, mass = 0.5, 20.0, 0.01, 0.05
     part = cube(mass=mass)
     scene = scene_of(part, square_gripper(side))
-    batch = AreaContact(friction=mu).evaluate_batch(
+    batch = AreaContact(friction=mu, margin_cap=1000).evaluate_batch(
         scene,
         np.broadcast_to(at().T_object_gripper, (41, 4, 4)),
         force=force,
@@ -117,7 +119,7 @@ def test_sphere_between_pads_holds_like_coulomb():
     mesh = trimesh.creation.icosphere(4, 0.015)
     part = GraspObject("ball", mesh.vertices, mesh.faces, 0.05)
     grasp = at()
-    verdict = AreaContact(friction=0.4).evaluate(scene_of(part), grasp)
+    verdict = AreaContact(friction=0.4, margin_cap=100).evaluate(scene_of(part), grasp)
     coulomb = 2 * 0.4 * grasp.force / (0.05 * GRAVITY)
     assert verdict.resists
     # The cap's slope against gravity adds to friction, never takes from it.
@@ -211,8 +213,10 @@ def test_three_jaws():
         jaws.append(Jaw(pad, T))
     gripper = ParallelJawGripper("three", tuple(jaws), 0.025, 20.0, 0.02)
     scene, grasp = Scene(part, gripper, np.eye(4)), Grasp(np.eye(4))
-    verdict = AreaContact(friction=0.5).evaluate(scene, grasp)
-    reference = ReferenceAreaContact(friction=0.5, triangles=None).evaluate(scene, grasp)
+    verdict = AreaContact(friction=0.5, margin_cap=100).evaluate(scene, grasp)
+    reference = ReferenceAreaContact(friction=0.5, triangles=None, margin_cap=100).evaluate(
+        scene, grasp
+    )
     assert len(verdict.patches) == 3
     assert verdict.margin == pytest.approx(3 * 0.5 * 20 / (0.05 * GRAVITY), rel=0.05)
     assert reference.resists and reference.margin == pytest.approx(verdict.margin, rel=0.1)
@@ -222,7 +226,7 @@ def test_soft_point_contact_closed_form():
     """Two antipodal points: force 2 mu f, torsion 2 gamma f about the closing axis."""
     mu, gamma, mass = 0.5, 0.004, 0.05
     scene = scene_of(cube(mass=mass))
-    model = PointContact(friction=mu, torsion=gamma)
+    model = PointContact(friction=mu, torsion=gamma, margin_cap=100)
     assert model.evaluate(scene, at()).margin == pytest.approx(
         2 * mu * 20 / (mass * GRAVITY), rel=2e-3
     )
@@ -234,7 +238,7 @@ def test_ellipse_closed_form_on_a_square():
     """A square's ellipse has semi-axes s / sqrt 3; force and torsion share one limit surface."""
     mu, mass, side, arm = 0.5, 0.05, 0.01, 0.009
     scene = scene_of(cube(mass=mass), square_gripper(side))
-    margin = EllipseContact(friction=mu).evaluate(scene, at(y=arm)).margin
+    margin = EllipseContact(friction=mu, margin_cap=100).evaluate(scene, at(y=arm)).margin
     force, torque = 2 * mu * 20, 2 * mu * 20 * 3 * np.pi / 16 * side / np.sqrt(3)
     weight = mass * GRAVITY
     assert margin == pytest.approx(1 / np.hypot(weight / force, weight * arm / torque), rel=3e-3)
