@@ -155,6 +155,7 @@ class Simulation:
         )
         self._world.lock_jaws_at(self._opening)
         self._world.advance(SETTLING_TIME)
+        self._world.teleport(self._T_world_hand)
         self._watcher = Watcher(self._world)
         self.new_motion_error()
 

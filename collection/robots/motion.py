@@ -31,6 +31,7 @@ from collection.robots.waypoints import (
     approach_pose,
     avoidance_pose,
     lift_pose,
+    put_down_pose,
     shake_poses,
     trial_waypoints,
 )
@@ -39,8 +40,6 @@ from reach.transforms import make_transform
 
 HOLD_PERIOD = 0.04
 """Between two readings while nothing moves [s]."""
-PUT_DOWN_SHORT = 0.002
-"""The hand stops this far above the grasp, so that the part is not pressed into the table [m]."""
 RECOVERY_LIFT = 0.050
 """After a collision the arm first clears its path upward [m]."""
 
@@ -253,8 +252,7 @@ def _return(
     retreat = lift_pose(T_world_gripper, settings)
     with recorder.phase(Phase.RETURN):
         if lifted:
-            down = make_transform(None, (0, 0, PUT_DOWN_SHORT)) @ T_world_gripper
-            met_table = _put_down(arm, frozen(down), settings, recorder)
+            met_table = _put_down(arm, put_down_pose(T_world_gripper), settings, recorder)
     with recorder.phase(Phase.RELEASE):
         gripper.open(on_sample=recorder.gripper_sample)
     with recorder.phase(Phase.RETREAT):

@@ -10,9 +10,12 @@ from reach.arrays import FloatArray, frozen
 from reach.gripper import ParallelJawGripper
 from reach.transforms import make_transform, rotation_about
 
+PUT_DOWN_SHORT = 0.002
+"""The hand stops this far above the grasp, so that the part is not pressed into the table [m]."""
+
 
 def trial_waypoints(T_world_gripper: FloatArray, settings: MotionSettings) -> list[Waypoint]:
-    """The way to the grasp and up again, for dry run and execution.
+    """The way to the grasp, up, down again and away, for dry run and execution.
 
     Args:
         T_world_gripper: the grasp, shape (4, 4).
@@ -24,6 +27,9 @@ def trial_waypoints(T_world_gripper: FloatArray, settings: MotionSettings) -> li
         Waypoint("approach", approach, Path.LINEAR),
         Waypoint("grasp", frozen(T_world_gripper), Path.LINEAR),
         Waypoint("lift", lift_pose(T_world_gripper, settings), Path.LINEAR),
+        Waypoint("put down", put_down_pose(T_world_gripper), Path.LINEAR),
+        Waypoint("retreat", approach, Path.LINEAR),
+        Waypoint("leave", avoidance_pose(approach, settings), Path.LINEAR),
     ]
 
 
@@ -42,6 +48,11 @@ def avoidance_pose(T_world_approach: FloatArray, settings: MotionSettings) -> Fl
 def lift_pose(T_world_gripper: FloatArray, settings: MotionSettings) -> FloatArray:
     """Straight up from the grasp, shape (4, 4)."""
     return frozen(make_transform(None, (0, 0, settings.lift_height)) @ T_world_gripper)
+
+
+def put_down_pose(T_world_gripper: FloatArray) -> FloatArray:
+    """Where a held part is let go: barely above the grasp, shape (4, 4)."""
+    return frozen(make_transform(None, (0, 0, PUT_DOWN_SHORT)) @ T_world_gripper)
 
 
 def shake_poses(

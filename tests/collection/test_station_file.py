@@ -9,9 +9,10 @@ import pytest
 import trimesh
 
 from collection.clock import SimulatedClock
-from collection.errors import StationFileError
+from collection.errors import CameraTimeoutError, StationFileError
 from collection.station import (
     PACKAGED,
+    build_station,
     example_station,
     load_station,
     parse_station,
@@ -96,6 +97,22 @@ def test_a_scripted_fault_of_unknown_kind_is_refused() -> None:
     with pytest.raises(StationFileError, match="emergency_stop") as raised:
         parse_station(wrong, "lab.toml")
     assert f":{line_of(wrong, 'fire')}:" in str(raised.value)
+
+
+def test_faults_of_the_station_file_happen_on_schedule() -> None:
+    text = SIMULATED + '\n[[simulation.faults]]\nkind = "camera_timeout"\nattempt = 2\n'
+    station = build_station(parse_station(text, "lab.toml"), text, PACKAGED, 0)
+    assert station.simulation is not None
+    mesh = trimesh.creation.box((0.03, 0.03, 0.03))
+    obj = GraspObject("cube", mesh.vertices, mesh.faces, 0.01)
+    resting = StablePose(0, 1.0, make_transform(None, (0, 0, 0.015)))
+    with station.camera as camera:
+        for attempt in (1, 2, 3):
+            station.simulation.place(obj, resting, np.random.default_rng(attempt))
+            if attempt == 2:
+                with pytest.raises(CameraTimeoutError):
+                    camera.capture()
+            camera.capture()
 
 
 def test_a_simulated_device_needs_the_simulation_section() -> None:
