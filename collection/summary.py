@@ -49,12 +49,13 @@ def summarize(state: SessionState) -> list[SummaryRow]:
 
 def summary_table(rows: Iterable[SummaryRow], *, simulated: bool) -> Table:
     """The rows as a table for the terminal."""
+    from rich import box
     from rich.table import Table
 
     rows = list(rows)
     models = list(dict.fromkeys(name for row in rows for name in row.predictions))
     title = "Simulated trials: labels and outcomes come from MuJoCo" if simulated else None
-    table = Table(title=title, title_justify="left")
+    table = Table(title=title, title_justify="left", box=box.SIMPLE_HEAD, padding=(0, 1))
     table.add_column("object")
     for heading in ("trials", "success", *(name.replace("-", "\n") for name in models)):
         table.add_column(heading, justify="right")

@@ -19,7 +19,7 @@ import numpy as np
 from collection import record_mapping as mapping
 from collection.errors import PlacementError, UnreachableError, UnsafeMotionError
 from collection.robots.execution import Execution
-from collection.robots.motion import dry_run, execute_grasp, reachable_grasps
+from collection.robots.motion import can_execute, execute_grasp
 from collection.trial_watch import TrialWatch
 from collection.truth import registration_error, true_outcome
 from logs.descriptions import STATION_FILE, gripper_attachment, robot_attachment
@@ -140,22 +140,11 @@ def _place(attempt: _Attempt) -> None:
         return
 
     def accept(T_world_object: FloatArray) -> bool:
-        return _within_reach(attempt.station, T_world_object @ attempt.grasp.T_object_gripper)
+        T_world_gripper = T_world_object @ attempt.grasp.T_object_gripper
+        return can_execute(attempt.station.arm, T_world_gripper, attempt.station.config.motion)
 
     rng = np.random.default_rng(attempt.seed)
     simulation.place(attempt.obj, attempt.pose, rng, accept=accept)
-
-
-def _within_reach(station: Station, T_world_gripper: FloatArray) -> bool:
-    """Whether the whole way of the trial is free, as far as a dry run tells."""
-    settings = station.config.motion
-    if not reachable_grasps(station.arm, T_world_gripper[None], settings)[0]:
-        return False
-    try:
-        dry_run(station.arm, T_world_gripper, settings)
-    except (UnreachableError, UnsafeMotionError):
-        return False
-    return True
 
 
 def _start(attempt: _Attempt, recorder: TrialRecorder) -> None:
