@@ -15,8 +15,8 @@ from logs.view_scene import OBJECT, SCENE_ANCHOR, WORLD
 from logs.view_stage import ELAPSED
 from reach.arrays import FloatArray
 
-SCENE_EYE = np.array([0.33, -0.42, 0.27])
-"""From the object to the scene's eye: beside the table, looking down at the hand [m]."""
+SCENE_EYE = np.array([0.35, -0.29, 0.20])
+"""From the object to the scene's eye: across the table, looking at hand and robot [m]."""
 CONTACT_EYE = np.array([0.062, -0.08, 0.049])
 """From an object of unit size to the eye that looks at its contacts; see the anchor's scale."""
 
@@ -81,7 +81,7 @@ def _scene() -> Any:
         ],
         background=colors.BACKGROUND,
         line_grid=rrb.LineGrid3D(visible=False),
-        eye_controls=_eye(SCENE_EYE, (0.0, 0.0, 0.07)),
+        eye_controls=_eye(SCENE_EYE, (0.0, 0.0, 0.06)),
     )
 
 

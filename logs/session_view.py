@@ -42,7 +42,13 @@ from logs.view_contacts import (
     pressure_rgba,
 )
 from logs.view_file import view_file
-from logs.view_scene import flat_mesh, object_triangles, recorded_gripper, show_fingers
+from logs.view_scene import (
+    believed_pose,
+    flat_mesh,
+    object_triangles,
+    recorded_gripper,
+    show_fingers,
+)
 from logs.view_stage import placed
 from logs.view_text import summary
 from reach.arrays import FloatArray
@@ -184,18 +190,21 @@ class _SessionDrawing:
 
 
 def _centered(record: TrialRecord) -> FloatArray:
-    """The object as it was found, moved to the scene's middle: all trials look alike."""
-    found = record.registration
-    T = np.array(found.T_world_object if found else record.descriptor.T_world_object)
+    """The object as it was found, moved to the scene's middle so that all trials look alike.
+
+    It is turned about the vertical: every hand closes along the scene's x axis, and stands
+    beyond the object, seen from the eye.
+    """
+    T = np.array(believed_pose(record))
     execution = record.execution
-    if execution is not None:
-        # Turn about the vertical so that every hand closes along the scene's x axis.
-        T_world_gripper = T @ execution.executed.T_object_gripper
-        closing = T_world_gripper[:2, 0]
-        angle = -np.arctan2(closing[1], closing[0])
-        c, s = np.cos(angle), np.sin(angle)
-        turn = np.array([(c, -s, 0.0), (s, c, 0.0), (0.0, 0.0, 1.0)])
-        T[:3, :3] = turn @ T[:3, :3]
+    grasp = execution.executed if execution else record.descriptor.planned
+    closing, approach = (T @ grasp.T_object_gripper)[:2, [0, 2]].T
+    if closing[0] * approach[1] - closing[1] * approach[0] > 0:
+        closing = -closing
+    length = np.hypot(*closing)
+    c, s = closing / length if length > 0 else (1.0, 0.0)
+    turn = np.array([(c, s, 0.0), (-s, c, 0.0), (0.0, 0.0, 1.0)])
+    T[:3, :3] = turn @ T[:3, :3]
     T[:2, 3] = 0.0
     return T
 

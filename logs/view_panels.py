@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections import Counter
+
 import numpy as np
 import rerun as rr
 
@@ -12,7 +14,7 @@ from logs.trial_record import TrialRecord
 from logs.view_stage import Stage
 from logs.view_text import summary
 
-COLOR, DEPTH = "images/color", "images/depth"
+COLOR, OTHER_COLOR, DEPTH = "images/color", "images/other_color", "images/depth"
 WIDTH, FORCE, JOINTS = "plots/width", "plots/force", "plots/joints"
 PHASE, EVENTS, SUMMARY = "phase", "events", "summary"
 DEPTH_STEPS = 10_000
@@ -36,9 +38,17 @@ def show_panels(
 def _show_images(stage: Stage, record: TrialRecord) -> None:
     for image in record.depth:
         stage.at(f"{DEPTH}/{image.camera}", image.time_ns, _depth_image(image))
+    first = _main_camera(record)
     for frame in record.color:
         shown = rr.EncodedImage(contents=frame.data, media_type=f"image/{frame.format}")
-        stage.at(f"{COLOR}/{frame.camera}", frame.time_ns, shown)
+        entity = COLOR if frame.camera == first else f"{OTHER_COLOR}/{frame.camera}"
+        stage.at(entity, frame.time_ns, shown)
+
+
+def _main_camera(record: TrialRecord) -> str | None:
+    """The camera that saw most of the trial: the others' pictures would lie over its own."""
+    frames = Counter(frame.camera for frame in record.color)
+    return max(sorted(frames), key=frames.__getitem__, default=None)
 
 
 def _depth_image(image: DepthImage) -> rr.DepthImage:

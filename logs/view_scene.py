@@ -44,9 +44,7 @@ OPENED_AGAIN = 2e-3
 def show_scene(stage: Stage, record: TrialRecord, *, blind: bool) -> None:
     """Draw everything that stands or moves in the world."""
     stage.static(WORLD, rr.ViewCoordinates.RIGHT_HAND_Z_UP)
-    found = record.registration
-    T_world_object = found.T_world_object if found else record.descriptor.T_world_object
-    stage.static(SCENE_ANCHOR, rr.Transform3D(translation=T_world_object[:3, 3]))
+    stage.static(SCENE_ANCHOR, rr.Transform3D(translation=believed_pose(record)[:3, 3]))
     _show_table(stage, record)
     gripper = recorded_gripper(record)
     if GRIPPER_FRAME not in record.frames:
@@ -62,7 +60,7 @@ def show_scene(stage: Stage, record: TrialRecord, *, blind: bool) -> None:
 
 
 def _show_table(stage: Stage, record: TrialRecord) -> None:
-    center = record.descriptor.T_world_object[:3, 3] * (1, 1, 0) - (0, 0, 0.012)
+    center = believed_pose(record)[:3, 3] * (1, 1, 0) - (0, 0, 0.012)
     half = (TABLE_SIZE / 2, TABLE_SIZE / 2, 0.01)
     stage.static(
         f"{WORLD}/table",
@@ -119,6 +117,7 @@ def _show_gripper(stage: Stage, record: TrialRecord, gripper: ParallelJawGripper
     track = record.frames[GRIPPER_FRAME]
     hand = f"{WORLD}/hand"
     stage.poses(hand, track.time_ns, track.transforms())
+    _show_boxes(stage.static, f"{hand}/palm", gripper.palm, colors.PALM)
     show_fingers(stage.static, hand, gripper)
     widths = np.clip(record.jaw.widths, 0.0, gripper.max_opening)
     for number, jaw in enumerate(gripper.jaws):
@@ -130,8 +129,7 @@ def _show_gripper(stage: Stage, record: TrialRecord, gripper: ParallelJawGripper
 
 
 def show_fingers(show: Show, hand: str, gripper: ParallelJawGripper) -> None:
-    """Draw the hand's solids, each jaw at full opening below its own entity `jaw_N`."""
-    _show_boxes(show, f"{hand}/palm", gripper.palm, colors.PALM)
+    """Draw each jaw's solids and pad, at full opening, below its own entity `jaw_N`."""
     for number, jaw in enumerate(gripper.jaws):
         entity = f"{hand}/jaw_{number}"
         _show_boxes(show, f"{entity}/finger", jaw.boxes, colors.FINGER)
@@ -161,10 +159,8 @@ def _show_pad(show: Show, entity: str, jaw: Jaw) -> None:
 
 def _show_planned_grasp(stage: Stage, record: TrialRecord, gripper: ParallelJawGripper) -> None:
     """Outlines of the open pads where the plan wanted them on the object as it was found."""
-    found = record.registration
-    T_world_object = found.T_world_object if found else record.descriptor.T_world_object
     planned = record.descriptor.planned
-    T_world_gripper = T_world_object @ planned.T_object_gripper
+    T_world_gripper = believed_pose(record) @ planned.T_object_gripper
     strips = []
     for number, jaw in enumerate(gripper.jaws):
         T = T_world_gripper @ gripper.T_gripper_pad(number, planned.opening)
@@ -211,17 +207,19 @@ def object_diameter(record: TrialRecord) -> float:
     return 0.05 if triangles is None else float(np.linalg.norm(np.ptp(triangles, axis=(0, 1))))
 
 
+def believed_pose(record: TrialRecord) -> FloatArray:
+    """T_world_object as it was found, or as it was planned if it was not, shape (4, 4)."""
+    found = record.registration
+    return found.T_world_object if found else record.descriptor.T_world_object
+
+
 def object_track(record: TrialRecord) -> tuple[IntArray, FloatArray]:
-    """Where the object is believed to be: planned, then as found, then carried by the hand.
+    """Where the object is believed to be: as it was found, then carried by the hand.
 
     Returns:
         Times (N,) [ns] and T_world_object (N, 4, 4).
     """
-    start = record.descriptor.time_ns
-    times, poses = [start], [record.descriptor.T_world_object]
-    if record.registration is not None:
-        times.append(max(record.registration.time_ns, start + 1))
-        poses.append(record.registration.T_world_object)
+    times, poses = [record.descriptor.time_ns], [believed_pose(record)]
     carried = _carried(record)
     if carried is not None:
         track, during = carried

@@ -54,9 +54,7 @@ class Stage:
             return
         times = np.concatenate([[min(self.start_ns, int(time_ns[0]))], time_ns])
         T = np.concatenate([T[:1], T])
-        columns = rr.Transform3D.columns(
-            translation=T[:, :3, 3], mat3x3=T[:, :3, :3].transpose(0, 2, 1).reshape(-1, 9)
-        )
+        columns = rr.Transform3D.columns(translation=T[:, :3, 3], mat3x3=T[:, :3, :3])
         self.columns(entity, times, columns)
 
 

@@ -8,7 +8,7 @@ import numpy as np
 
 from logs.annotations import Annotations, LabelRecord, ScoreRecord
 from logs.trial_record import TrialRecord
-from logs.view_contacts import highest_pressure
+from logs.view_contacts import PREFERRED, highest_pressure
 
 DISAGREES = 0.5
 """A model predicts success from this score on."""
@@ -63,6 +63,7 @@ def _scores(annotations: Annotations) -> str:
     scores = annotations.newest_scores
     if not scores:
         return ""
+    scores = dict(sorted(scores.items(), key=lambda item: (item[0] != PREFERRED, item[0])))
     label = annotations.label
     lines = ["## Scores", "| model | predicts | |", "|---|---|---|"]
     for model, score in scores.items():
