@@ -46,8 +46,8 @@ class Console:
         mode: `run` a session, or `review` recorded trials.
         pictures: what may be looked at.
         live_view: the stream of the session under way, shown beside the keys.
-        recordings: the blind recording (.rrd) of an executed trial, for relabeling; may draw it
-            first, takes as long as it takes.
+        recordings: the blind recording (.rrd) of an executed trial, for the moment of labeling
+            and for relabeling; may draw it first, takes as long as it takes.
         root: the session's folder; nothing outside it is served. None in practice.
         simulated: the station is simulated.
         practice: nothing is stored.

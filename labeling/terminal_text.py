@@ -67,6 +67,8 @@ def trial_text(view: View, *, rotated: bool) -> Table:
     table.add_row("trial", f"{trial['number']} of {trial['of']}{take}")
     table.add_row("object", escape(trial["object"]))
     table.add_row("step", trial["phase"].replace("_", " ").lower())
+    if trial["again_because"]:
+        table.add_row("once more", escape(trial["again_because"]))
     for name, value in (trial["info"].get("registration") or {}).items():
         shown = f"{value:.3g}" if isinstance(value, float) else str(value)
         table.add_row(escape(name.replace("_", " ")), escape(shown))

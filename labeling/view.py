@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 from typing import Any, Final
 
-from labeling.console import Console
+from labeling.console import Console, no_recording
 from labeling.taxonomy import CAUSE_TEXT, KEYS, REASON_TEXT, RULE
 from logs.events import Outcome, Phase
 from logs.state import SessionState, TakeState, TrialState
@@ -54,6 +54,7 @@ def console_view(console: Console) -> View:
             **_verdicts(console, state),
             "elapsed": (time.time_ns() - state.opened_ns) / 1e9 if state.opened_ns else None,
             "live_view": console.live_view.url if console.live_view else None,
+            "recordings": console.recordings is not no_recording,
             "second": console.second,
             "trial": _current(console, state),
             "undoable": None if console.second else _undoable(state),
@@ -116,7 +117,14 @@ def trial_view(trial: TrialState, take: TakeState) -> View:
         "placed": take.placed,
         "info": dict(take.info),
         "recovered": take.recovered,
+        "again_because": _again_because(trial, take),
     }
+
+
+def _again_because(trial: TrialState, take: TakeState) -> str:
+    """Why the take before this one did not count."""
+    earlier = [other for other in trial.takes if other.take < take.take]
+    return earlier[-1].ended_because if earlier else ""
 
 
 def label_view(take: TakeState) -> View | None:

@@ -14,7 +14,8 @@ export class Stage {
   // onKey(key) for keys pressed inside the embedded view.
   constructor(link, onKey) {
     this.link = link;
-    this.shown = { placing: null, overlay: null, viewer: null };
+    this.loaded = { placing: {}, overlay: {}, recording: {} }; // what was asked for, and what came
+    this.frameAddress = null;
     window.addEventListener("message", (event) => {
       const frame = byId("viewer").contentWindow;
       const ours = event.source === frame && event.origin === viewerOrigin();
@@ -24,53 +25,77 @@ export class Stage {
   }
 
   draw(view, trial) {
-    const pictures = trial?.pictures ?? [];
-    const howTo = pictures.find((name) => name !== OVERLAY);
-    const placing = Boolean(howTo) && trial?.phase === "PLACE_OBJECT" && view.mode === "run";
-    this.picture("placing", howTo, trial, placing);
-    if (view.mode === "review") {
-      this.recording(trial);
-    } else {
-      const overlaid = pictures.includes(OVERLAY);
-      const found = overlaid && ["REGISTER", "CONFIRM_POSE"].includes(trial?.phase);
-      this.viewer(view.live_view && !found && !placing ? `url=${encodeURIComponent(view.live_view)}` : null);
-      this.picture("overlay", OVERLAY, trial, overlaid && !placing && (found || !view.live_view));
-    }
-    byId("stage-empty").hidden = ["viewer", "overlay", "placing"].some((id) => !byId(id).hidden);
+    this.view = view;
+    this.trial = trial;
+    const candidates = this.candidates(view, trial);
+    const chosen = candidates.find((name) => this.ready(name));
+    for (const id of ["placing", "overlay"]) byId(id).hidden = chosen !== id;
+    byId("viewer").hidden = !["live", "recording"].includes(chosen);
+    if (chosen === "live") this.point(`url=${encodeURIComponent(view.live_view)}`);
+    if (chosen === "recording") this.point(this.loaded.recording.came);
+    byId("stage-empty").hidden = Boolean(chosen);
+    byId("stage-empty").textContent = candidates.includes("recording")
+      ? "The recording is drawn, or there is none to look at." : "The view of the trial appears here.";
   }
 
-  async picture(id, name, trial, wanted) {
-    const figure = byId(id);
-    const address = wanted ? `/api/pictures/${encodeURIComponent(trial.trial_id)}/${trial.take}/${encodeURIComponent(name)}` : null;
-    const version = wanted ? `${address}?${trial.phase}` : null; // a picture may be drawn anew per phase
-    figure.hidden = !wanted;
-    if (this.shown[id] === version) return;
-    this.shown[id] = version;
-    const source = address ? await this.link.picture(address) : null;
-    if (this.shown[id] !== version) return;
-    const image = figure.querySelector("img");
+  // What may fill the stage now, the best first.
+  candidates(view, trial) {
+    if (!trial) return view.live_view ? ["live"] : [];
+    const pictures = trial.pictures ?? [];
+    const how = pictures.some((name) => name !== OVERLAY) ? ["placing"] : [];
+    const overlay = pictures.includes(OVERLAY) ? ["overlay"] : [];
+    const live = view.live_view ? ["live"] : [];
+    const recording = view.recordings ? ["recording"] : [];
+    if (view.mode === "review") return recording;
+    switch (trial.phase) {
+      case "PLACE_OBJECT": return [...how, ...live];
+      case "REGISTER":
+      case "CONFIRM_POSE": return [...overlay, ...live, ...how];
+      case "AWAITING_LABEL": return [...live, ...recording, ...overlay, ...how];
+      default: return [...live, ...overlay, ...how];
+    }
+  }
+
+  // True if it can be shown; if it is not there yet, it is fetched, and drawn when it came.
+  ready(name) {
+    if (name === "live") return true;
+    const slot = this.loaded[name];
+    const key = `${this.trial.trial_id}/${this.trial.take}/${name === "recording" ? "" : this.trial.phase}`;
+    if (slot.key !== key) {
+      Object.assign(slot, { key, came: null });
+      this.fetch(name, slot, key);
+    }
+    return Boolean(slot.came);
+  }
+
+  async fetch(name, slot, key) {
+    const { trial } = this;
+    const came = name === "recording" ? await this.recording(trial) : await this.picture(name, trial);
+    if (slot.key !== key) return; // another trial is on the stage by now
+    slot.came = came;
+    this.draw(this.view, this.trial);
+  }
+
+  async picture(id, trial) {
+    const name = id === OVERLAY ? OVERLAY : trial.pictures.find((other) => other !== OVERLAY);
+    const path = `/api/pictures/${encodeURIComponent(trial.trial_id)}/${trial.take}/${encodeURIComponent(name)}`;
+    const source = await this.link.picture(path).catch(() => null);
+    const image = byId(id).querySelector("img");
     if (image.src.startsWith("blob:")) URL.revokeObjectURL(image.src);
     image.src = source ?? "data:,";
-    figure.hidden = !source;
-  }
-
-  viewer(query) {
-    const frame = byId("viewer");
-    frame.hidden = !query;
-    if (!query || this.shown.viewer === query) return; // a hidden view keeps its stream
-    this.shown.viewer = query;
-    frame.src = `${viewerOrigin()}/viewer/?${query}`;
+    return source;
   }
 
   async recording(trial) {
-    const id = trial?.trial_id ?? null;
-    if (this.shown.recording === id) return;
-    this.shown.recording = id;
-    const answer = id ? await this.link.post("/api/recordings", { trial_id: id }) : null;
-    if (this.shown.recording !== id) return;
-    const path = answer?.ok ? (await answer.json()).path : null;
-    this.viewer(path ? `url=${encodeURIComponent(viewerOrigin() + path)}` : null);
-    byId("stage-empty").hidden = Boolean(path);
-    byId("stage-empty").textContent = "There is no recording of this trial to look at.";
+    const answer = await this.link.post("/api/recordings", { trial_id: trial.trial_id }).catch(() => null);
+    if (!answer?.ok) return null;
+    const { path } = await answer.json();
+    return `url=${encodeURIComponent(viewerOrigin() + path)}`;
+  }
+
+  point(query) {
+    if (this.frameAddress === query) return; // a hidden view keeps its stream
+    this.frameAddress = query;
+    byId("viewer").src = `${viewerOrigin()}/viewer/?${query}`;
   }
 }

@@ -354,3 +354,26 @@ def test_the_page_reports_no_errors(browser: Any, awaiting: Page) -> None:
     awaiting.press("f", "x", "t", "p", "p", "r", "x")
     awaiting.wait("return document.getElementById('choices').hidden")
     assert [entry for entry in browser.get_log("browser") if entry["level"] == "SEVERE"] == []
+
+
+def test_pictures_show_how_to_place_and_what_was_found(
+    bench: Any, serve: Any, browser: Any
+) -> None:
+    from io import BytesIO
+
+    from PIL import Image
+
+    stream = BytesIO()
+    Image.new("RGB", (8, 6), "red").save(stream, "PNG")
+    server = serve(bench)
+    take = bench.begin()
+    server._console.pictures.put(take.trial_id, 1, "placing", stream.getvalue)
+    page = Page(browser, server.link)
+    page.wait("return document.querySelector('#placing img').naturalWidth === 8")
+    assert page.element("placing").is_displayed() and not page.element("overlay").is_displayed()
+    bench.do("placed", 1)
+    server._console.pictures.put(take.trial_id, 1, "overlay", stream.getvalue)
+    take.advance(Phase.REGISTER, {"registration": {"fitness": 0.93}})
+    page.wait("return document.querySelector('#overlay img').naturalWidth === 8")
+    assert page.element("overlay").is_displayed() and not page.element("placing").is_displayed()
+    assert "0.930" in page.element("registration").text
