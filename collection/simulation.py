@@ -15,14 +15,14 @@ import numpy as np
 from collection.clock import SimulatedClock
 from collection.errors import CollectionError
 from collection.faults import Fault, FaultKind, FaultSchedule
+from collection.hidden import HiddenDraws, draw_hidden
 from collection.operator_sim import SimulatedVerdict, Watcher
 from collection.simulation_settings import SimulationSettings
 from reach.arrays import FloatArray, frozen
 from reach.gripper import ParallelJawGripper
 from reach.objects import GraspObject
-from reach.transforms import apply, exp, make_transform, rotation_about
+from reach.transforms import apply, make_transform, rotation_about
 from reach.world.grasp_world import GraspWorld
-from reach.world.parameters import WorldParameters
 
 PLACEMENTS_TRIED = 60
 SETTLING_TIME = 0.4
@@ -46,21 +46,6 @@ class RestingPose(Protocol):
 
 class NothingPlacedError(CollectionError):
     """The simulated table is empty."""
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class HiddenDraws:
-    """What was drawn in secret for one object.
-
-    Args:
-        world: contact parameters.
-        T_gripper_error: constant error of the hand's true pose, in the gripper's frame.
-        force_factor: true over commanded closing force.
-    """
-
-    world: WorldParameters
-    T_gripper_error: FloatArray
-    force_factor: float
 
 
 @dataclass(frozen=True, slots=True)
@@ -195,7 +180,7 @@ class Simulation:
     def hidden(self, obj: GraspObject) -> HiddenDraws:
         """The hidden draws of an object, the same in every session with this seed."""
         if obj.content_hash not in self._draws:
-            self._draws[obj.content_hash] = self._draw(obj)
+            self._draws[obj.content_hash] = draw_hidden(self.settings, obj, self.gripper, self.seed)
         return self._draws[obj.content_hash]
 
     # -- what the simulated devices do -----------------------------------------------------------
@@ -315,25 +300,6 @@ class Simulation:
         return (
             make_transform(turn, (x, y, self.workspace.table_height)) @ stable_pose.T_world_object
         )
-
-    def _draw(self, obj: GraspObject) -> HiddenDraws:
-        rng = np.random.default_rng([self.seed, int(obj.content_hash[:12], 16)])
-        settings = self.settings
-        world = WorldParameters(
-            friction=float(rng.uniform(*settings.friction)),
-            table_friction=float(rng.uniform(*settings.table_friction)),
-            pad_modulus=float(rng.uniform(*settings.pad_modulus)),
-            closing_speed=settings.closing_speed,
-            timestep=settings.timestep,
-        )
-        tilt = rng.normal(0.0, settings.hand_tilt, 3)
-        offset = rng.normal(0.0, settings.hand_offset, 3)
-        factor = 1.0 + float(rng.normal(0.0, settings.force_error))
-        # the error turns about the pads, not about the wrist: a calibrated hand is right there
-        pads = np.mean([j.T_gripper_pad_open[:3, 3] for j in self.gripper.jaws], axis=0)
-        about_pads = exp(np.concatenate([tilt, np.zeros(3)]))
-        about_pads = make_transform(about_pads[:3, :3], pads - about_pads[:3, :3] @ pads + offset)
-        return HiddenDraws(world, about_pads, max(0.5, factor))
 
 
 def _bounding_box(gripper: ParallelJawGripper) -> tuple[FloatArray, FloatArray]:

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager, suppress
+from collections.abc import Callable
+from contextlib import suppress
 
 import numpy as np
 
@@ -12,17 +12,13 @@ from collection.errors import CollisionStopError, RobotError
 from collection.robots.execution import (
     Execution,
     Phase,
-    PhaseEvent,
-    PhaseSpan,
     SensorVerdict,
-    TraceSample,
 )
+from collection.robots.motion_recorder import EventListener, MotionRecorder, SampleListener
 from collection.robots.motion_settings import MotionSettings
 from collection.robots.protocol import (
     Arm,
-    ArmSample,
     GripperDevice,
-    GripperSample,
     Path,
     Speed,
     Waypoint,
@@ -38,13 +34,8 @@ from collection.robots.waypoints import (
 from reach.arrays import BoolArray, FloatArray, frozen
 from reach.transforms import make_transform
 
-HOLD_PERIOD = 0.04
-"""Between two readings while nothing moves [s]."""
 RECOVERY_LIFT = 0.050
 """After a collision the arm first clears its path upward [m]."""
-
-EventListener = Callable[[PhaseEvent], None]
-SampleListener = Callable[[TraceSample], None]
 
 
 def reachable_grasps(
@@ -110,7 +101,7 @@ def execute_grasp(
         RobotError: whatever stopped the motion; arm and hand are then stopped, a held part
             still held.
     """
-    recorder = _Recorder(clock, gripper, on_event, on_sample)
+    recorder = MotionRecorder(clock, gripper, on_event, on_sample)
     finished = False
     try:
         execution = _run(
@@ -153,7 +144,7 @@ def _run(
     gripper: GripperDevice,
     T_world_gripper: FloatArray,
     settings: MotionSettings,
-    recorder: _Recorder,
+    recorder: MotionRecorder,
 ) -> Execution:
     start_ns = recorder.clock.now_ns()
     waypoints = {each.name: each for each in trial_waypoints(T_world_gripper, settings)}
@@ -230,7 +221,7 @@ def _shake(
     gripper: GripperDevice,
     T_world_lift: FloatArray,
     settings: MotionSettings,
-    recorder: _Recorder,
+    recorder: MotionRecorder,
 ) -> None:
     for T in shake_poses(T_world_lift, gripper.geometry, settings):
         arm.move_to_pose(
@@ -243,7 +234,7 @@ def _return(
     gripper: GripperDevice,
     T_world_gripper: FloatArray,
     settings: MotionSettings,
-    recorder: _Recorder,
+    recorder: MotionRecorder,
     *,
     lifted: bool,
 ) -> bool:
@@ -263,7 +254,7 @@ def _return(
     return met_table
 
 
-def _put_down(arm: Arm, T: FloatArray, settings: MotionSettings, recorder: _Recorder) -> bool:
+def _put_down(arm: Arm, T: FloatArray, settings: MotionSettings, recorder: MotionRecorder) -> bool:
     try:
         arm.move_to_pose(
             T,
@@ -278,7 +269,7 @@ def _put_down(arm: Arm, T: FloatArray, settings: MotionSettings, recorder: _Reco
     return False
 
 
-def _rise(arm: Arm, T: FloatArray, speed: Speed, recorder: _Recorder) -> None:
+def _rise(arm: Arm, T: FloatArray, speed: Speed, recorder: MotionRecorder) -> None:
     arm.move_to_pose(T, path=Path.LINEAR, speed=speed, on_sample=recorder.arm_sample)
 
 
@@ -286,59 +277,3 @@ def _pose(
     pose_of: Callable[..., FloatArray], T: FloatArray, settings: MotionSettings
 ) -> FloatArray:
     return pose_of(T) if pose_of.__name__ == "<lambda>" else pose_of(T, settings)
-
-
-class _Recorder:
-    """Collects phases and readings, and passes them on."""
-
-    def __init__(
-        self,
-        clock: Clock,
-        gripper: GripperDevice,
-        on_event: EventListener | None,
-        on_sample: SampleListener | None,
-    ) -> None:
-        self.clock = clock
-        self.phases: list[PhaseSpan] = []
-        self.samples: list[TraceSample] = []
-        self._gripper = gripper
-        self._on_event = on_event
-        self._on_sample = on_sample
-        self._joints: FloatArray = frozen(np.zeros(0))
-        self._T_world_gripper: FloatArray = make_transform()
-
-    @contextmanager
-    def phase(self, phase: Phase) -> Iterator[None]:
-        """Mark the beginning and end of a phase."""
-        start_ns = self.clock.now_ns()
-        if self._on_event is not None:
-            self._on_event(PhaseEvent(phase, start_ns))
-        yield
-        self.phases.append(PhaseSpan(phase, start_ns, self.clock.now_ns()))
-
-    def arm_rests(self, joints: FloatArray, T_world_gripper: FloatArray) -> None:
-        """Remember where the arm is while only the hand is read."""
-        self._joints, self._T_world_gripper = frozen(joints), frozen(T_world_gripper)
-
-    def arm_sample(self, sample: ArmSample) -> None:
-        """Record a reading of the moving arm, with one of the hand."""
-        self.arm_rests(sample.joints, sample.T_world_gripper)
-        self._add(sample.time_ns, self._gripper.read())
-
-    def gripper_sample(self, sample: GripperSample) -> None:
-        """Record a reading of the moving jaws; the arm rests."""
-        self._add(sample.time_ns, sample)
-
-    def watch_hand(self, seconds: float) -> None:
-        """Read the hand for some time while nothing moves."""
-        end_ns = self.clock.now_ns() + round(seconds * 1e9)
-        while self.clock.now_ns() < end_ns:
-            self.clock.sleep(min(HOLD_PERIOD, (end_ns - self.clock.now_ns()) * 1e-9))
-            sample = self._gripper.read()
-            self._add(sample.time_ns, sample)
-
-    def _add(self, time_ns: int, hand: GripperSample) -> None:
-        sample = TraceSample(time_ns, self._joints, self._T_world_gripper, hand.width, hand.force)
-        self.samples.append(sample)
-        if self._on_sample is not None:
-            self._on_sample(sample)
