@@ -99,20 +99,26 @@ def friction_points(
     l21 = 2.0 * v12 / l11 if l11 > 1e-12 else 0.0
     l22 = np.sqrt(max(0.0, 2.0 * v22 - l21 * l21))
     share = 0.25 * scale * force
+    m_xx = 1.0 - _rotated_form(T, 0, 0, m, group) / force
+    m_yy = 1.0 - _rotated_form(T, 1, 1, m, group) / force
+    m_zz = 1.0 - _rotated_form(T, 2, 2, m, group) / force
+    m_xy = -_rotated_form(T, 0, 1, m, group) / force
+    m_xz = -_rotated_form(T, 0, 2, m, group) / force
+    m_yz = -_rotated_form(T, 1, 2, m, group) / force
+    per_length = 1.0 / length
     for k in range(4):
         sign = 1.0 if k % 2 == 0 else -1.0
         along, across = (sign * l11, sign * l21) if k < 2 else (0.0, sign * l22)
         x = cx + along * px + across * sx
         y = cy + along * py + across * sy
         z = cz + along * pz + across * sz
+        column = first + k
         for i in range(3):
-            points[i, first + k] = (T[i, 0] * x + T[i, 1] * y + T[i, 2] * z + T[i, 3]) / length
-            points[3 + i, first + k] = 1.0 - _rotated_form(T, i, i, m, group) / force
-            points[9 + i, first + k] = 0.0
-        points[6, first + k] = -_rotated_form(T, 0, 1, m, group) / force
-        points[7, first + k] = -_rotated_form(T, 0, 2, m, group) / force
-        points[8, first + k] = -_rotated_form(T, 1, 2, m, group) / force
-        points[12, first + k] = share
+            points[i, column] = (T[i, 0] * x + T[i, 1] * y + T[i, 2] * z + T[i, 3]) * per_length
+            points[9 + i, column] = 0.0
+        points[3, column], points[4, column], points[5, column] = m_xx, m_yy, m_zz
+        points[6, column], points[7, column], points[8, column] = m_xy, m_xz, m_yz
+        points[12, column] = share
     return first + 4
 
 
