@@ -306,7 +306,9 @@ def _sum_up(asked: Conduct, folder: SessionFolder, terminal: Console) -> None:
 def _write_report(asked: Conduct, folder: SessionFolder, terminal: Console) -> Path | None:
     if not asked.report or folder.read_state().counts().labelled == 0:
         return None
-    from logs.report import write_report
+    from collection.reporting import write_report
 
+    page = folder.path / "report.html"
     with terminal.status("writing the report"):
-        return write_report([folder.path], folder.path / "report.html")
+        write_report([folder.path], page)
+    return page

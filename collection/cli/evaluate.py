@@ -56,7 +56,7 @@ def evaluate(
     - `reach evaluate sessions/mon sessions/tue --cross-validate --backend loky`
     """
     from collection.cli.evaluation_table import evaluation_table, print_table, progress_bars
-    from collection.cli.report import write_text
+    from collection.reporting import write_text
     from logs.dataset_sources import load_labeled
     from reach.evaluation.backends import cluster
     from reach.evaluation.compare import compare, scorers_of
@@ -174,7 +174,7 @@ def _cross_validation(
 
 
 def _write_plots(result: Evaluation, folder: Path) -> None:
-    from collection.cli.report import write_text
+    from collection.reporting import write_text
     from logs.report.curves import precision_recall_svg, reliability_svg
 
     folder.mkdir(parents=True, exist_ok=True)

@@ -1,0 +1,81 @@
+"""Writing the report of sessions or data sets: models compared, then one page."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from reach.errors import InvalidInputError
+
+if TYPE_CHECKING:
+    from reach.evaluation.table import Evaluation
+
+REPORT_MODELS = ("point", "point-robust", "ellipse", "ellipse-robust", "reach", "reach-robust")
+
+
+def write_report(
+    sources: Sequence[Path],
+    page: Path,
+    *,
+    models: Sequence[str] = REPORT_MODELS,
+    pose_error: str | None = None,
+    seed: int = 0,
+    backend: str = "serial",
+    unblinded: bool = False,
+    progress: Callable[[str, int, int], None] | None = None,
+) -> Evaluation:
+    """Compare models on the labeled trials of sessions or data sets, and write the page.
+
+    Args:
+        sources: session or data-set folders.
+        page: the HTML file; a reader sees the old one or the new one.
+        models: names of the models to compare.
+        pose_error: standard deviations METERS,RADIANS, instead of what the data states.
+        seed: of perturbations and bootstrap.
+        backend: where scores are computed.
+        unblinded: let labels given after seeing a prediction replace blind ones.
+        progress: told the model, how many grasps are scored, and of how many.
+
+    Returns:
+        How the models compare.
+
+    Raises:
+        InvalidInputError: the page cannot be written.
+    """
+    from collection.cli.evaluate import chosen_pose_error
+    from logs.dataset_sources import load_labeled
+    from logs.report.page import build_report
+    from reach.evaluation.backends import cluster
+    from reach.evaluation.compare import compare, scorers_of
+
+    dataset = load_labeled(sources, unblinded=unblinded)
+    error, stated = chosen_pose_error(dataset, pose_error)
+    with cluster(backend, None):
+        result = compare(
+            dataset.cases(),
+            scorers_of(models),
+            pose_error=error,
+            seed=seed,
+            backend=backend,
+            progress=progress,
+        )
+    write_text(page, build_report(dataset, result, error, basis=stated["basis"], seed=seed))
+    return result
+
+
+def write_text(path: Path, text: str) -> None:
+    """Write a file whole: a reader sees the old one or the new one.
+
+    Raises:
+        InvalidInputError: if it cannot be written.
+    """
+    temporary = path.with_name(f".{path.name}.writing-{os.getpid()}")
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        temporary.write_text(text, encoding="utf-8")
+        os.replace(temporary, path)
+    except OSError as error:
+        temporary.unlink(missing_ok=True)
+        raise InvalidInputError(f"cannot write {path}: {error}") from error
