@@ -6,8 +6,9 @@ from typing import Any
 
 import pytest
 from lark.exceptions import LarkError
-from yumi_emulator.interpreter import Arguments, RapidError, Run, Task
+from yumi_emulator.interpreter import Task
 from yumi_emulator.language import parse_module
+from yumi_emulator.runtime import Arguments, RapidError, Run
 from yumi_emulator.values import RapidTypeError, to_text
 
 

@@ -12,6 +12,7 @@ from yumi_emulator import Arm, Controller
 from yumi_emulator.interpreter import INSTRUCTIONS
 from yumi_emulator.kinematics import HOME, Vector
 from yumi_emulator.language import Module, parse_expression
+from yumi_emulator.runtime import Arguments, RapidError, Run
 from yumi_emulator.values import ATOMIC, RECORDS, to_text
 
 from collection.robots.yumi.link import module_text, module_version
@@ -227,6 +228,19 @@ def test_a_collision_while_lifting_is_still_a_collision(controller: Controller, 
     ask(controller, Request(Command.PING), 2)
     controller.advance(0.1)
     assert answer(controller).sequence == 2  # the program goes on
+
+
+def test_a_lift_out_of_reach_does_not_hide_the_collision(
+    controller: Controller, right: Arm
+) -> None:
+    def out_of_reach(_: Arguments) -> Run:
+        raise RapidError("ERR_OUTSIDE_REACH")
+
+    right.procedures["movel"] = out_of_reach
+    controller.faults.collide_at = 0.5
+    ask(controller, _joint_request(10.0), 1)
+    controller.advance(20.0)
+    assert answer(controller).failure is Failure.COLLISION
 
 
 def _joint_request(turn_deg: float) -> Request:

@@ -9,8 +9,8 @@ import numpy as np
 from scipy.spatial.transform import Rotation, Slerp
 
 from yumi_emulator.faults import Faults
-from yumi_emulator.interpreter import Arguments, RapidError, Run
 from yumi_emulator.kinematics import HOME, MAX_SPEED, Chain, NoSolutionError, Vector
+from yumi_emulator.runtime import Arguments, RapidError, Run
 from yumi_emulator.values import Record, Types
 
 FAR = 9e9

@@ -11,9 +11,10 @@ import numpy as np
 from yumi_emulator.arm import ArmMotion, ProgramStopError
 from yumi_emulator.faults import Faults
 from yumi_emulator.hand import Hand
-from yumi_emulator.interpreter import Arguments, RapidError, Run, Task
+from yumi_emulator.interpreter import Task
 from yumi_emulator.kinematics import Vector
 from yumi_emulator.language import Module, parse_expression
+from yumi_emulator.runtime import Arguments, RapidError, Run
 from yumi_emulator.values import Record, Types, to_text
 
 ERRORS = (

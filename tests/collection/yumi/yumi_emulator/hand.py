@@ -6,7 +6,7 @@ from collections.abc import Callable
 from typing import Any
 
 from yumi_emulator.faults import Faults
-from yumi_emulator.interpreter import Arguments, RapidError, Run
+from yumi_emulator.runtime import Arguments, RapidError, Run
 
 TRAVEL = 25.0
 """Of one jaw [mm]."""

@@ -7,76 +7,26 @@ from __future__ import annotations
 
 import operator
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, field
-from typing import Any, Protocol
+from typing import Any
 
 from lark import Tree
 
 from yumi_emulator.language import Data, Module, Routine
+from yumi_emulator.runtime import (
+    Arguments,
+    Builtins,
+    Frame,
+    Interrupt,
+    RapidError,
+    Retry,
+    Return,
+    Run,
+    TryNext,
+)
 from yumi_emulator.values import RapidTypeError, Record, Types
 
-Run = Iterator[None]
 INSTRUCTIONS = {"waituntil", "itimer", "idelete"}
 """What the interpreter itself carries out; all else comes from the controller."""
-
-
-class RapidError(Exception):
-    """A recoverable error: what ERRNO names."""
-
-    def __init__(self, name: str) -> None:
-        super().__init__(name)
-        self.name = name.lower()
-
-
-@dataclass
-class Arguments:
-    positional: list[Any] = field(default_factory=list)
-    optional: dict[str, Any] = field(default_factory=dict)
-
-
-class Builtins(Protocol):
-    """What the controller brings: instructions, functions, constants."""
-
-    procedures: dict[str, Callable[[Arguments], Run]]
-    functions: dict[str, Callable[[Arguments], Any]]
-    constants: dict[str, Any]
-    shared: dict[str, Any]
-
-    def now(self) -> float:
-        """Time [s]."""
-        ...
-
-
-@dataclass
-class Interrupt:
-    """A trap routine, and when it is due."""
-
-    trap: str
-    period: float = float("inf")
-    due: float = float("inf")
-
-
-@dataclass
-class Frame:
-    routine: Routine
-    variables: dict[str, Any]
-    types: dict[str, str]
-    handling: bool = False
-
-
-class _Return(Exception):  # noqa: N818 - control flow, not an error
-    """RETURN leaves the routine."""
-
-    def __init__(self, value: Any) -> None:
-        self.value = value
-
-
-class _TryNext(Exception):  # noqa: N818 - control flow, not an error
-    """TRYNEXT leaves the ERROR clause."""
-
-
-class _Retry(Exception):  # noqa: N818 - control flow, not an error
-    """RETRY leaves the ERROR clause."""
 
 
 _ARITHMETIC: dict[str, Callable[[Any, Any], Any]] = {
@@ -171,7 +121,7 @@ class Task:
             variables[data.name] = self._initial(data)
         try:
             yield from self._statements(frame, routine.statements)
-        except _Return as result:
+        except Return as result:
             return result.value
         if routine.returns:
             raise RapidTypeError(f"{routine.name} ends without RETURN")
@@ -196,10 +146,10 @@ class Task:
         self._errno, frame.handling = self._errno_of(error), True
         try:
             yield from self._statements(frame, frame.routine.handler)
-        except _TryNext:
+        except TryNext:
             frame.handling = False
             return False
-        except _Retry:
+        except Retry:
             frame.handling = False
             return True
         raise RapidTypeError(f"the ERROR clause of {frame.routine.name} leads nowhere")
@@ -276,7 +226,7 @@ class Task:
         (expression,) = tree.children
         value = None if expression is None else self._value(frame, expression)
         returns = frame.routine.returns
-        raise _Return(self.types.typed(returns, value) if returns else None)
+        raise Return(self.types.typed(returns, value) if returns else None)
         yield  # a generator, like all statements
 
     def _do_raise(self, frame: Frame, tree: Tree) -> Run:
@@ -290,11 +240,11 @@ class Task:
         yield
 
     def _do_trynext(self, frame: Frame, tree: Tree) -> Run:
-        raise _TryNext
+        raise TryNext
         yield
 
     def _do_retry(self, frame: Frame, tree: Tree) -> Run:
-        raise _Retry
+        raise Retry
         yield
 
     # ---- expressions
