@@ -28,10 +28,26 @@ def evaluation_table(content: Mapping[str, Any]) -> list[Table]:
     for name, row in content["models"].items():
         style = "dim" if name in references else None
         table.add_row(*_cells(name, row), style=style)
-    tables = [table]
+    tables = [table, _majority_table(content)]
     if "cross_validation" in content:
         tables.append(_cross_validation_table(content["cross_validation"]))
     return tables
+
+
+def _majority_table(content: Mapping[str, Any]) -> Table:
+    """The same with one label a grasp."""
+    from rich.table import Table
+
+    table = Table(
+        title="One label a grasp: lifted in more than half of its trials", title_justify="left"
+    )
+    for header in ("model", "AP", "AR", "F1", "MAE", "Brier"):
+        table.add_column(header, justify="left" if header == "model" else "right", no_wrap=True)
+    references = set(content["references"])
+    for name, row in content["models"].items():
+        numbers = (_number(row["majority"][key]) for key in ("ap", "ar", "f1", "mae", "brier"))
+        table.add_row(name, *numbers, style="dim" if name in references else None)
+    return table
 
 
 def print_table(tables: list[Table]) -> None:

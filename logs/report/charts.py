@@ -39,8 +39,8 @@ MODEL_COLORS = {
     "settled": "#0d9f6e",
     "dynamic": "#c2255c",
     "constant": "#94a3b8",
-    "overlap": "#64748b",
-    "oracle": "#334155",
+    "overlap": "#a98467",
+    "oracle": "#7b8794",
 }
 SUCCESS_COLOR, FAILURE_COLOR = "#0d9f6e", "#d9480f"
 
@@ -71,7 +71,7 @@ def to_svg(canvas: Any, name: str) -> str:
 
     stream = io.StringIO()
     with mpl.rc_context({**STYLE, "svg.hashsalt": name}):
-        canvas.savefig(stream, format="svg", metadata={"Date": None, "Creator": None})
+        canvas.savefig(stream, format="svg", dpi=160, metadata={"Date": None, "Creator": None})
     text = stream.getvalue()
     text = text[text.index("<svg") :].strip()
     text = text.replace(_INK, "currentColor")

@@ -87,6 +87,7 @@ def pressure_svg(found: PressureComparison, name: str = "pressure") -> str:
             cmap="viridis",
             edgecolor="face",
             lw=0.2,
+            rasterized=True,  # thousands of shades: a picture inside the chart is smaller
         )
         left.add_collection(shades)
         shades.set_clim(0, None)

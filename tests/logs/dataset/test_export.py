@@ -290,6 +290,18 @@ def _with_trials(dataset, change):
     return replace(dataset, trials=trials)
 
 
+@pytest.mark.slow
+def test_a_whole_experiment_is_written_within_ten_seconds(make_dataset, tmp_path):
+    import time
+
+    dataset = make_dataset(objects=21, grasps=25, repeats=5, faces=1280)
+    assert len(dataset.trials) == 2625
+    start = time.process_time()
+    write_dataset(dataset, tmp_path / "d", FORMATS)
+    assert time.process_time() - start < 10
+    assert len(read_dataset(tmp_path / "d").trials) == 2625
+
+
 KILLED_WRITER = """
 import sys, pickle
 from pathlib import Path
