@@ -11,7 +11,8 @@ from logs import view_colors as colors
 from logs import view_panels as panels
 from logs.trial_record import TrialRecord
 from logs.view_contacts import CONTACT_ANCHOR, CONTACTS, SHOWN_CONTACTS
-from logs.view_scene import OBJECT, SCENE_ANCHOR, WORLD
+from logs.view_object import OBJECT, WORLD
+from logs.view_scene import SCENE_ANCHOR
 from logs.view_stage import ELAPSED
 from reach.arrays import FloatArray
 

@@ -150,3 +150,18 @@ def encode_stop(stop: TrialStop) -> v1.TrialStop:
         reason=stop.reason,
         message_counts=dict(stop.message_counts),
     )
+
+
+def encode_metadata(descriptor: TrialDescriptor) -> dict[str, str]:
+    """What a record's metadata tells other tools; readers here trust the messages."""
+    known = {
+        "trial_id": descriptor.trial_id,
+        "session_id": descriptor.session_id,
+        "number": str(descriptor.number),
+        "take": str(descriptor.take),
+        "object": descriptor.object_name,
+        "seed": str(descriptor.seed),
+        "simulated": str(descriptor.simulated).lower(),
+    }
+    versions = {f"version.{name}": value for name, value in descriptor.versions.items()}
+    return {**descriptor.metadata, **versions, **known}

@@ -6,7 +6,6 @@ where it may stop: at the next phase, result or the stop, never within a sampled
 
 from __future__ import annotations
 
-import io
 import time
 from collections import Counter
 from collections.abc import Callable, Iterable, Mapping, Sequence
@@ -29,10 +28,10 @@ from logs.records import (
     ExecutionRecord,
     ExitStatus,
     RegistrationRecord,
-    Severity,
     TrialDescriptor,
     TrialEvent,
     TrialStop,
+    gap_event,
 )
 from logs.streams import WORLD, CameraRecord, CloudRecord, ColorImage, DepthImage
 from logs.trial_folder import RECORD_NAME
@@ -41,7 +40,6 @@ from reach.arrays import FloatArray, frozen
 METADATA_NAME = "reach-trials"
 BACKLOG_LIMIT = 256 * 2**20
 """Samples and images beyond this backlog are dropped, and reported as a gap [bytes]."""
-JPEG_QUALITY = 90
 _SMALL = 1024
 
 
@@ -84,7 +82,9 @@ class TrialRecorder:
         self, descriptor: TrialDescriptor, attachments: Iterable[AttachmentRecord] = ()
     ) -> None:
         """Write which trial this is, what is tried, and the files that describe it."""
-        self._writer.add(lambda file: file.metadata(METADATA_NAME, _metadata(descriptor)))
+        self._writer.add(
+            lambda file: file.metadata(METADATA_NAME, encode.encode_metadata(descriptor))
+        )
         stamp = descriptor.time_ns
         self._result(topics.START, encode.encode_start(descriptor), stamp)
         self._result(topics.DESCRIPTOR, encode.encode_descriptor(descriptor), stamp)
@@ -160,7 +160,7 @@ class TrialRecorder:
         kept = frozen(pixels, np.uint8)
 
         def message() -> Message:
-            return streams.encode_color(ColorImage(time_ns, jpeg(kept), "jpeg", camera))
+            return streams.encode_color(ColorImage.compress(time_ns, kept, camera))
 
         topic = topics.camera_topic(camera, "color")
         self._sample(topic, message, time_ns, sequence, kept.nbytes)
@@ -240,7 +240,7 @@ class TrialRecorder:
         """
         stamp, received = self._stamp(time_ns), self._now()
         for topic, count in sorted(self._dropped.items()):
-            self._event(_gap(topic, count, "the disk did not keep up", stamp))
+            self._event(gap_event(topic, count, "the disk did not keep up", stamp))
 
         def finish(file: DurableMcap) -> None:
             stop = TrialStop(stamp, exit_status, reason, dict(file.counts))
@@ -311,27 +311,7 @@ class TrialRecorder:
         self._sequences[topic] = sequence
         if last is not None and sequence != last + 1:
             why = f"the device's counter went from {last} to {sequence}"
-            self._event(_gap(topic, max(sequence - last - 1, 0), why, time_ns))
-
-
-def jpeg(pixels: NDArray[np.uint8]) -> bytes:
-    """RGB pixels (H, W, 3) as a JPEG file."""
-    from PIL import Image
-
-    buffer = io.BytesIO()
-    Image.fromarray(pixels).save(buffer, "jpeg", quality=JPEG_QUALITY)
-    return buffer.getvalue()
-
-
-def _gap(topic: str, missing: int, why: str, time_ns: int) -> TrialEvent:
-    return TrialEvent(
-        time_ns,
-        EventKind.GAP,
-        "missing",
-        f"{missing} on {topic}: {why}",
-        Severity.WARNING,
-        {"topic": topic, "missing": str(missing)},
-    )
+            self._event(gap_event(topic, max(sequence - last - 1, 0), why, time_ns))
 
 
 def _floats(values: Sequence[float]) -> tuple[float, ...]:
@@ -340,17 +320,3 @@ def _floats(values: Sequence[float]) -> tuple[float, ...]:
 
 def _optional(values: Sequence[float] | None) -> tuple[float, ...] | None:
     return None if values is None else _floats(values)
-
-
-def _metadata(descriptor: TrialDescriptor) -> dict[str, str]:
-    known = {
-        "trial_id": descriptor.trial_id,
-        "session_id": descriptor.session_id,
-        "number": str(descriptor.number),
-        "take": str(descriptor.take),
-        "object": descriptor.object_name,
-        "seed": str(descriptor.seed),
-        "simulated": str(descriptor.simulated).lower(),
-    }
-    versions = {f"version.{name}": value for name, value in descriptor.versions.items()}
-    return {**descriptor.metadata, **versions, **known}

@@ -233,3 +233,15 @@ class TrialStop:
     exit_status: ExitStatus
     reason: str = ""
     message_counts: Mapping[str, int] = field(default_factory=dict)
+
+
+def gap_event(topic: str, missing: int, why: str, time_ns: int) -> TrialEvent:
+    """The event that tells that measurements of a channel are missing."""
+    return TrialEvent(
+        time_ns,
+        EventKind.GAP,
+        "missing",
+        f"{missing} on {topic}: {why}",
+        Severity.WARNING,
+        {"topic": topic, "missing": str(missing)},
+    )

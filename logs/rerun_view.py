@@ -62,8 +62,9 @@ def _write(
     from logs.blueprint import blind_blueprint, trial_blueprint
     from logs.view_contacts import show_contacts
     from logs.view_file import view_file
+    from logs.view_object import object_diameter
     from logs.view_panels import show_panels
-    from logs.view_scene import object_diameter, show_scene
+    from logs.view_scene import show_scene
     from logs.view_stage import Stage
 
     described = record.descriptor

@@ -42,14 +42,9 @@ from logs.view_contacts import (
     pressure_rgba,
 )
 from logs.view_file import view_file
-from logs.view_scene import (
-    believed_pose,
-    flat_mesh,
-    object_triangles,
-    recorded_gripper,
-    show_fingers,
-)
-from logs.view_stage import placed
+from logs.view_object import believed_pose, object_triangles
+from logs.view_robot import recorded_gripper, show_fingers
+from logs.view_stage import flat_mesh, placed
 from logs.view_text import summary
 from reach.arrays import FloatArray
 from reach.gripper import ParallelJawGripper

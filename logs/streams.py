@@ -13,6 +13,7 @@ from reach.transforms import as_transform
 
 WORLD = "world"
 """Name of the world frame."""
+JPEG_QUALITY = 90
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -91,6 +92,17 @@ class ColorImage:
     data: bytes
     format: str = "jpeg"
     camera: str = "color"
+
+    @classmethod
+    def compress(cls, time_ns: int, pixels: NDArray[np.uint8], camera: str) -> ColorImage:
+        """Compress RGB pixels, shape (H, W, 3), as JPEG."""
+        import io
+
+        from PIL import Image
+
+        buffer = io.BytesIO()
+        Image.fromarray(pixels).save(buffer, "jpeg", quality=JPEG_QUALITY)
+        return cls(time_ns, buffer.getvalue(), "jpeg", camera)
 
     def pixels(self) -> NDArray[np.uint8]:
         """Decode to RGB, shape (H, W, 3)."""

@@ -7,8 +7,8 @@ import rerun as rr
 
 from logs import view_colors as colors
 from logs.annotations import PatchRecord, ScoreRecord
-from logs.view_scene import OBJECT, flat_mesh
-from logs.view_stage import Stage
+from logs.view_object import OBJECT
+from logs.view_stage import Stage, flat_mesh
 
 CONTACTS = f"{OBJECT}/contacts"
 SHOWN_CONTACTS = f"{CONTACTS}/shown"

@@ -61,3 +61,21 @@ class Stage:
 def placed(T_parent_frame: FloatArray) -> Any:
     """A frame's pose as Rerun's transform."""
     return rr.Transform3D(translation=T_parent_frame[:3, 3], mat3x3=T_parent_frame[:3, :3])
+
+
+def flat_mesh(triangles: FloatArray, color: Any, vertex_colors: Any = None) -> Any:
+    """Triangles (F, 3, 3) with one normal a face, so that edges stay edges.
+
+    A hundred thousand faces are drawn and sent as they are; vertices are not shared.
+    """
+    corners = triangles.reshape(-1, 3).astype(np.float32)
+    cross = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
+    length = np.linalg.norm(cross, axis=1, keepdims=True)
+    normals = np.divide(cross, length, out=np.zeros_like(cross), where=length > 0)
+    return rr.Mesh3D(
+        vertex_positions=corners,
+        triangle_indices=np.arange(len(corners), dtype=np.uint32).reshape(-1, 3),
+        vertex_normals=np.repeat(normals, 3, axis=0).astype(np.float32),
+        albedo_factor=None if vertex_colors is not None else color,
+        vertex_colors=vertex_colors,
+    )

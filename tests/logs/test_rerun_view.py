@@ -24,7 +24,7 @@ from logs.session_overview import TIMELINES, overview
 from logs.session_view import write_session_view
 from logs.trial_record import read_record
 from logs.view_colors import pressure_colors
-from logs.view_scene import object_track
+from logs.view_object import object_track
 from logs.view_text import summary
 from reach.transforms import exp
 
