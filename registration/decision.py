@@ -23,20 +23,43 @@ by less than `SensorProfile.distinct`; that is another pose from these distances
 
 
 @dataclass(frozen=True, slots=True, eq=False)
+class RatedRival:
+    """A physically different hypothesis.
+
+    Args:
+        hypothesis: the rival.
+        margin: evidence for the chosen hypothesis against it.
+        ruled_out: whether that is evidence enough.
+    """
+
+    hypothesis: Hypothesis
+    margin: float
+    ruled_out: bool
+
+
+@dataclass(frozen=True, slots=True, eq=False)
 class Decision:
     """The chosen hypothesis and its standing.
 
     Args:
         chosen: the hypothesis that explains the image best.
-        margin: evidence for it against the strongest physically different one.
-        rivals: physically different hypotheses with their margins, strongest first.
+        rivals: physically different hypotheses, strongest first.
         contradicts_declared: it keeps to another stable pose than the declared one.
     """
 
     chosen: Hypothesis
-    margin: float
-    rivals: tuple[tuple[Hypothesis, float], ...]
+    rivals: tuple[RatedRival, ...]
     contradicts_declared: bool
+
+    @property
+    def margin(self) -> float:
+        """Evidence against the strongest rival; 1 without one."""
+        return min((rival.margin for rival in self.rivals), default=1.0)
+
+    @property
+    def ambiguous(self) -> bool:
+        """Whether some rival is not ruled out."""
+        return any(not rival.ruled_out for rival in self.rivals)
 
 
 def decide(job: Job, found: Sequence[Hypothesis], declared: int | None) -> Decision:
@@ -58,8 +81,9 @@ def decide(job: Job, found: Sequence[Hypothesis], declared: int | None) -> Decis
         else:
             contradicts = True
     rivals = _rivals(job, chosen, found)
-    margin = min((m for _, m in rivals), default=1.0)
-    return Decision(chosen, margin, tuple(rivals[:MOST_RIVALS]), contradicts)
+    # All that are not ruled out are told; of the others, the strongest.
+    count = max(MOST_RIVALS, sum(not rival.ruled_out for rival in rivals))
+    return Decision(chosen, tuple(rivals[:count]), contradicts)
 
 
 def _refuted(job: Job, declared: Hypothesis, other: Hypothesis) -> bool:
@@ -83,22 +107,34 @@ def _winner(job: Job, near: Sequence[Hypothesis]) -> Hypothesis:
     return best
 
 
-def _rivals(
-    job: Job, chosen: Hypothesis, found: Sequence[Hypothesis]
-) -> list[tuple[Hypothesis, float]]:
+def _rivals(job: Job, chosen: Hypothesis, found: Sequence[Hypothesis]) -> list[RatedRival]:
     near = [h for h in found if h.cost <= chosen.cost + CLEARLY_WORSE]
     here = [h for h in near if h.search is chosen.search and _differ(job, chosen, h)]
-    rated = list(zip(here, map(float, _margins(job, chosen, here)), strict=True))
+    rated = [
+        RatedRival(h, float(margin), bool(margin >= _required(job, chosen, h)))
+        for h, margin in zip(here, _margins(job, chosen, here), strict=True)
+    ]
     # Another thing on the table that the part explains as well: which one is meant, no pixel
     # can tell.
     rated += [
-        (h, 0.0)
+        RatedRival(h, 0.0, ruled_out=False)
         for h in found
         if h.search is not chosen.search
         and h.cost <= job.profile.max_cost
         and _differ(job, chosen, h)
     ]
-    return sorted(rated, key=lambda pair: pair[1])
+    return sorted(rated, key=lambda rival: (rival.ruled_out, rival.margin))
+
+
+def _required(job: Job, chosen: Hypothesis, rival: Hypothesis) -> float:
+    """Evidence that rules a rival out: less for a variant of a nearly symmetric part.
+
+    A variant's few differing pixels cannot give much evidence, and mistaking it moves no
+    surface by more than `SensorProfile.distinct`.
+    """
+    apart = job.model.surface_distance(chosen.T_camera_object, rival.T_camera_object)
+    profile = job.profile
+    return profile.min_margin if apart > profile.distinct else profile.variant_margin
 
 
 def _margins(

@@ -22,6 +22,7 @@ class SensorProfile:
         max_cost: a pose with a larger render cost does not explain the image.
         min_margin: less evidence than this against some rival makes a pose ambiguous; see
             `registration.evidence.pairwise_margins`.
+        variant_margin: the same for a rival whose surface parts by less than `distinct`.
         bias: standard deviation of the error that a whole patch of depths shares [m].
     """
 
@@ -30,12 +31,13 @@ class SensorProfile:
     distinct: float
     max_cost: float
     min_margin: float
+    variant_margin: float
     bias: float
 
 
 PROFILES = {
-    "structured-light": SensorProfile((1e-4, 6e-4), 0.8e-3, 3e-3, 0.25, 0.25, 3e-5),
-    "stereo": SensorProfile((4e-4, 3e-3), 3e-3, 5e-3, 0.35, 0.25, 2e-4),
+    "structured-light": SensorProfile((1e-4, 6e-4), 0.8e-3, 3e-3, 0.25, 0.15, 0.05, 3e-5),
+    "stereo": SensorProfile((4e-4, 3e-3), 3e-3, 5e-3, 0.35, 0.15, 0.05, 2e-4),
 }
 """By `DepthFrame.sensor`."""
 

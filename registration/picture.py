@@ -46,7 +46,7 @@ def check_picture(path: str | Path) -> Path:
 def save_picture(
     path: str | Path, obj: GraspObject, frame: DepthFrame, registration: Registration
 ) -> None:
-    """Draw the depth image with the chosen pose's outline (green) and the rivals' (red).
+    """Draw the depth image with the chosen pose's outline (green) and those of rivals not ruled out (red).
 
     Raises:
         PictureError: unknown kind of picture, or the file cannot be written.
@@ -62,6 +62,7 @@ def save_picture(
     rivals = [
         silhouette(mesh, frame, T_camera_world @ rival.T_world_object)
         for rival in registration.rivals
+        if not rival.ruled_out
     ]
     with matplotlib.rc_context({"svg.hashsalt": "reach"}):
         figure = Figure(figsize=(7, 6), layout="constrained")
@@ -114,5 +115,5 @@ def _title(obj: GraspObject, registration: Registration) -> str:
     return (
         f"{obj.name}: {standing}, stable pose {registration.stable_pose}, "
         f"cost {registration.render_cost:.3f}, margin {registration.margin:.2f}, "
-        f"{len(registration.rivals)} rivals"
+        f"{sum(not rival.ruled_out for rival in registration.rivals)} rivals"
     )

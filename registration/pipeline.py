@@ -146,12 +146,13 @@ def _report(job: Job, decision: Decision, mode: str) -> Registration:
         margin=decision.margin,
         rivals=tuple(
             Rival(
-                T_world_camera @ rival.T_camera_object,
-                None if rival.stable_pose == FREE else rival.stable_pose,
-                rival.cost,
-                margin,
+                T_world_camera @ rival.hypothesis.T_camera_object,
+                None if rival.hypothesis.stable_pose == FREE else rival.hypothesis.stable_pose,
+                rival.hypothesis.cost,
+                rival.margin,
+                rival.ruled_out,
             )
-            for rival, margin in decision.rivals
+            for rival in decision.rivals
         ),
         unobservable=unobservable_directions(
             polished.information, job.obj.com, job.obj.diameter / 2
@@ -160,7 +161,7 @@ def _report(job: Job, decision: Decision, mode: str) -> Registration:
         table=TableFit(
             job.table.normal_world, job.table.offset_world, job.table.rms, job.table.tilt
         ),
-        ambiguous=decision.margin < job.profile.min_margin,
+        ambiguous=decision.ambiguous,
         contradicts_declared=decision.contradicts_declared,
         seed=job.seed,
         timings=dict(job.timings),

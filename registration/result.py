@@ -21,12 +21,14 @@ class Rival:
         stable_pose: its index, None if it is none of them.
         render_cost: as of the chosen pose.
         margin: evidence for the chosen pose against this one, see `Registration.margin`.
+        ruled_out: whether that is evidence enough.
     """
 
     T_world_object: FloatArray
     stable_pose: int | None
     render_cost: float
-    margin: float
+    margin: float = 0.0
+    ruled_out: bool = False
 
     def __post_init__(self) -> None:
         object.__setattr__(
@@ -73,11 +75,11 @@ class Registration:
         render_cost: mean robust disagreement with the image, 0 (perfect) to 1.
         margin: evidence against the strongest physically different pose, -1 to 1: over the
             pixels where the two differ, the share that speaks for this one; 1 without a rival.
-        rivals: physically different poses that the margin does not rule out, strongest first.
+        rivals: physically different poses that explain the image nearly as well, strongest first.
         unobservable: directions that the image does not tell, in words.
         tilt: angle between the part and the stable pose found [rad]; NaN without one.
         table: the table's plane.
-        ambiguous: a rival is too strong: ask the operator, or place the part again.
+        ambiguous: a rival is not ruled out: ask the operator, or place the part again.
         contradicts_declared: another stable pose than the declared one explains the image.
         seed: of the random draws.
         timings: CPU seconds by stage.
@@ -127,7 +129,7 @@ class Registration:
 
         The gripper goes where the chosen pose puts it. Had a rival been true, it would stand
         at another T_object_gripper; only if that is the planned one up to a symmetry of the
-        part, for every rival, may an ambiguous trial run unasked.
+        part, for every rival that is not ruled out, may an ambiguous trial run unasked.
 
         Args:
             obj: the part.
@@ -150,4 +152,5 @@ class Registration:
                 max_shift,
             )
             for rival in self.rivals
+            if not rival.ruled_out
         )

@@ -52,8 +52,8 @@ def register(
     """
     from collection.cloud_file import read_cloud
     from collection.objects import load_object
-    from registration.picture import check_picture, save_picture
     from registration import register as find
+    from registration.picture import check_picture, save_picture
 
     if picture is not None:
         check_picture(picture)
@@ -94,6 +94,7 @@ def registration_json(part: GraspObject, found: Registration) -> dict[str, Any]:
                 "stable_pose": rival.stable_pose,
                 "render_cost": rival.render_cost,
                 "margin": rival.margin,
+                "ruled_out": rival.ruled_out,
             }
             for rival in found.rivals
         ],
