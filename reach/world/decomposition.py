@@ -16,7 +16,7 @@ from reach.cache import cache_key, cached_arrays
 from reach.objects import GraspObject
 from reach.world.coacd_process import run_coacd
 
-VERSION = 1
+VERSION = 2
 CONCAVITY = 0.05
 """CoACD's concavity threshold, in parts of the diameter: how much hollow a part may fill."""
 MOST_PARTS = 48
@@ -56,9 +56,9 @@ def _decompose(obj: GraspObject) -> list[tuple[NDArray[Any], NDArray[Any]]]:
         obj.faces,
         threshold=CONCAVITY,
         max_convex_hull=MOST_PARTS,
-        resolution=1000,
+        resolution=500,
         mcts_nodes=10,
-        mcts_iterations=60,
+        mcts_iterations=30,
         max_ch_vertex=64,
         seed=0,
     )
