@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import multiprocessing
 from collections import deque
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Sequence
 from concurrent.futures import Future, ProcessPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
@@ -19,7 +19,8 @@ from logs.mirror import AnnotationMirror
 
 if TYPE_CHECKING:
     from collection.scoring import Prediction
-    from labeling.controller import EventSink, SessionController
+    from labeling.controller import SessionController
+    from logs.journal import Journal
     from logs.session import SessionFolder
     from logs.state import TakeState
     from reach.pose_error import PoseError
@@ -35,8 +36,9 @@ class TappedJournal:
         journal: where events are stored.
     """
 
-    def __init__(self, journal: EventSink) -> None:
+    def __init__(self, journal: Journal) -> None:
         self._journal = journal
+        self.earlier = journal.entries
         self.fresh: deque[Entry] = deque()
 
     def append(self, event: AnyEvent) -> Entry:
@@ -65,7 +67,6 @@ class Annotator:
         session: the session.
         controller: the session's writer.
         journal: the controller's journal.
-        earlier: entries of earlier processes.
         models: names of the models that score each take.
         pose_error: of the station, beside registration's own.
     """
@@ -75,14 +76,13 @@ class Annotator:
         session: SessionFolder,
         controller: SessionController,
         journal: TappedJournal,
-        earlier: Iterable[Entry],
         models: Sequence[str],
         pose_error: PoseError,
     ) -> None:
         self._session = session
         self._controller = controller
         self._journal = journal
-        self._mirror = AnnotationMirror(session, earlier)
+        self._mirror = AnnotationMirror(session, journal.earlier)
         self._models = tuple(models)
         self._pose_error = pose_error
         self._pool = ProcessPoolExecutor(1, multiprocessing.get_context("forkserver"))

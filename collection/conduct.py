@@ -10,7 +10,7 @@ from collections.abc import Iterator, Mapping
 from contextlib import ExitStack, contextmanager
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
 from pydantic import ValidationError
 from rich.console import Console
@@ -30,8 +30,7 @@ from logs.state import SessionState
 from reach.errors import ReachError, UnknownNameError
 
 if TYPE_CHECKING:
-    from collection.progress import SessionProgress
-    from collection.session import Session
+    from collection.annotator import TappedJournal
     from collection.station import Station
     from labeling.controller import SessionController
 
@@ -80,8 +79,7 @@ def show_plan(given: Mapping[str, Any], *, as_json: bool) -> None:
 
     options = resolve(given)
     station = _load(options)
-    with _planning_station(station):
-        setup = make_setup(options, station)
+    setup = make_setup(options, station)
     if as_json:
         print(setup.plan.to_json())
         return
@@ -124,7 +122,7 @@ def _create(asked: Conduct, terminal: Console) -> tuple[SessionFolder, Setup, St
         raise SessionExistsError(asked.out)
     station = _load(options)
     _check_operator(options, station)
-    with terminal.status("planning"), _planning_station(station):
+    with terminal.status("planning"):
         setup = make_setup(options, station)
     folder = SessionFolder.create(asked.out, setup.descriptor(station), setup.files())
     return folder, setup, station
@@ -157,12 +155,6 @@ def _load(options: SessionOptions) -> Station:
     return load_station(options.station, seed=options.seed)
 
 
-@contextmanager
-def _planning_station(station: Station) -> Iterator[None]:
-    """Planning asks the arm what it reaches; that needs no connection."""
-    yield
-
-
 def _check_operator(options: SessionOptions, station: Station) -> None:
     if options.operator == "auto" and station.simulation is None:
         raise OptionsError(
@@ -174,68 +166,37 @@ def _check_operator(options: SessionOptions, station: Station) -> None:
 def _run(
     asked: Conduct, folder: SessionFolder, setup: Setup, station: Station, terminal: Console
 ) -> None:
-    from collection.annotator import Annotator, TappedJournal
-    from collection.progress import SessionProgress
+    from collection.annotator import TappedJournal
     from collection.robots.motion import make_safe
-    from collection.session import Session
-    from collection.trial import TrialContext
     from labeling.controller import SessionController
     from logs.disk import trials_left
     from logs.recovery import recover_session
 
-    source = Source.OPERATOR_SIM if setup.options.operator == "auto" else Source.OPERATOR
     if asked.resume:
         for finding in recover_session(folder.path).findings:
             terminal.print(f"{finding.place}: {finding.text}", markup=False)
     stored = folder.open_journal()
-    journal = TappedJournal(stored)
     state = SessionState.fold(folder.descriptor.trials, stored.entries)
+    journal = TappedJournal(stored)
     controller = SessionController(
         journal,
         state,
         stop=lambda: make_safe(station.arm, station.gripper),
         trials_left=lambda: trials_left(folder.trials),
     )
-    status, reason = "failed", ""
+    auto = setup.options.operator == "auto"
+    status: Literal["finished", "ended", "failed"] = "failed"
+    reason = ""
     try:
         open_segment(
             stored,
             state,
             fingerprints(station, setup.plan),
             operator=getpass.getuser(),
-            source=source,
+            source=Source.OPERATOR_SIM if auto else Source.OPERATOR,
             accept=asked.accepted,
         )
-        context = TrialContext(
-            folder.descriptor.session_id,
-            folder.path,
-            folder.descriptor.seed,
-            station,
-            setup.plan,
-            setup.objects,
-            folder.descriptor.versions,
-        )
-        pose_error = station.config.pose_error.total()
-        with ExitStack() as stack:
-            annotator = stack.enter_context(
-                Annotator(
-                    folder, controller, journal, stored.entries, setup.options.models, pose_error
-                )
-            )
-            progress = stack.enter_context(SessionProgress(controller, terminal))
-            session = Session(
-                context,
-                controller,
-                annotator,
-                folder.trial_folder,
-                setup.options.attempts,
-                attended=setup.options.operator != "auto",
-                say=progress.say,
-            )
-            stack.enter_context(_operator(setup, station, controller, session, progress))
-            stack.enter_context(_ending_on_signals(controller))
-            session.annotate_earlier()
-            session.run()
+        _lead(folder, setup, station, controller, journal, terminal)
         status = "finished" if state.next_work() is None else "ended"
     except ReachError as error:
         reason = str(error)
@@ -244,8 +205,63 @@ def _run(
         status, reason = "ended", "interrupted"
         raise
     finally:
-        controller.close(status, reason)  # type: ignore[arg-type]
+        controller.close(status, reason)
     _sum_up(asked, folder, terminal)
+
+
+def _lead(
+    folder: SessionFolder,
+    setup: Setup,
+    station: Station,
+    controller: SessionController,
+    journal: TappedJournal,
+    terminal: Console,
+) -> None:
+    """Bring loop, operator, annotator and progress together, until the session ends."""
+    from collection.annotator import Annotator
+    from collection.operators import WebConsole, simulated_operator
+    from collection.progress import SessionProgress
+    from collection.session import Session
+    from collection.trial import TrialContext
+
+    options, described = setup.options, folder.descriptor
+    web = WebConsole(controller, setup, folder, simulated=described.simulated)
+    context = TrialContext(
+        described.session_id,
+        folder.path,
+        described.seed,
+        station,
+        setup.plan,
+        setup.objects,
+        described.versions,
+        None if options.operator == "auto" else web.offer_overlay,
+    )
+    with ExitStack() as stack:
+        progress = stack.enter_context(SessionProgress(controller, terminal))
+        annotator = stack.enter_context(
+            Annotator(
+                folder, controller, journal, options.models, station.config.pose_error.total()
+            )
+        )
+        session = Session(
+            context,
+            controller,
+            annotator,
+            folder.trial_folder,
+            options.attempts,
+            attended=options.operator != "auto",
+            say=progress.say,
+        )
+        stack.enter_context(_ending_on_signals(controller))
+        if options.operator == "auto":
+            stack.enter_context(simulated_operator(controller, station, setup))
+        else:
+            link = stack.enter_context(web.serve())
+            progress.say(f"console   {link}")
+            progress.say("or over SSH: reach console LINK")
+        session.annotate_earlier()
+        session.run()
+        annotator.finish(progress.scoring)
 
 
 @contextmanager
@@ -256,27 +272,6 @@ def _ending_on_signals(controller: SessionController) -> Iterator[None]:
         yield
     finally:
         signal.signal(signal.SIGTERM, before)
-
-
-@contextmanager
-def _operator(
-    setup: Setup,
-    station: Station,
-    controller: SessionController,
-    session: Session,
-    progress: SessionProgress,
-) -> Iterator[None]:
-    from collection.operators import simulated_operator, web_console
-
-    if setup.options.operator == "auto":
-        with simulated_operator(controller, station, setup):
-            yield
-    else:
-        with web_console(controller, setup, session.context) as link:
-            progress.say(f"console: {link}")
-            if setup.options.operator == "terminal":
-                progress.say("terminal console: reach console LINK, here or over SSH")
-            yield
 
 
 def _sum_up(asked: Conduct, folder: SessionFolder, terminal: Console) -> None:

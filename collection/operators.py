@@ -5,21 +5,25 @@ from __future__ import annotations
 import getpass
 from collections.abc import Iterator
 from contextlib import contextmanager
+from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from collection.placing import instruction, placing_picture
+from collection.placing import placing_picture
 
 if TYPE_CHECKING:
     from collection.setup import Setup
     from collection.station import Station
-    from collection.trial import TrialContext
     from labeling.controller import SessionController
-    from labeling.pictures import PictureShelf
+    from logs.session import SessionFolder
     from logs.state import TakeState, TrialState
+    from reach.objects import GraspObject
+    from registration.frame import DepthFrame
+    from registration.result import Registration
 
-PICTURE = "how to place it"
+PLACING, OVERLAY = "how to place it", "overlay"
 
 
 @contextmanager
@@ -49,50 +53,83 @@ def _nearest_pose(station: Station, setup: Setup, trial: TrialState, take: TakeS
     return min(range(len(turns)), key=lambda n: turns[n][0] + turns[n][1] / 0.03)
 
 
-@contextmanager
-def web_console(
-    controller: SessionController, setup: Setup, context: TrialContext
-) -> Iterator[str]:
-    """The page, served to this machine; yields the link that opens it."""
-    from labeling.access import make_access
-    from labeling.commands import Actor
-    from labeling.console import Console
-    from labeling.pictures import PictureShelf
-    from labeling.server import ConsoleServer, free_port
-    from logs.events import Source
+class WebConsole:
+    """The page, served to this machine.
 
-    shelf = PictureShelf(context.session_path)
-    forget = controller.listen(lambda: _offer_picture(controller, setup, shelf))
-    console = Console(
-        controller,
-        Actor(getpass.getuser(), Source.OPERATOR),
-        title=context.session_path.name,
-        pictures=shelf,
-        simulated=context.station.simulation is not None,
-    )
-    try:
-        with ConsoleServer(console, make_access("127.0.0.1", free_port("127.0.0.1"))) as server:
-            yield server.link
-    finally:
-        forget()
+    Args:
+        controller: the session's writer.
+        setup: of the session.
+        folder: of the session.
+        simulated: the station is simulated.
+    """
 
+    def __init__(
+        self,
+        controller: SessionController,
+        setup: Setup,
+        folder: SessionFolder,
+        *,
+        simulated: bool,
+    ) -> None:
+        from labeling.pictures import PictureShelf
 
-def _offer_picture(controller: SessionController, setup: Setup, shelf: PictureShelf) -> None:
-    """Put the picture of how to place the present object on the shelf; drawn when looked at."""
-    with controller.reading() as state:
-        trial = state.current_trial
-        if trial is None or not trial.takes:
+        self._controller = controller
+        self._setup = setup
+        self._folder = folder
+        self._simulated = simulated
+        self._shelf = PictureShelf(folder.path)
+
+    @contextmanager
+    def serve(self) -> Iterator[str]:
+        """Serve the page; yields the link that opens it."""
+        from labeling.access import make_access
+        from labeling.commands import Actor
+        from labeling.console import Console
+        from labeling.reviewing import blind_recording
+        from labeling.server import ConsoleServer, free_port
+        from logs.events import Source
+
+        console = Console(
+            self._controller,
+            Actor(getpass.getuser(), Source.OPERATOR),
+            title=self._folder.path.name,
+            pictures=self._shelf,
+            recordings=lambda trial: blind_recording(self._folder, trial),
+            root=self._folder.path,
+            simulated=self._simulated,
+        )
+        access = make_access("127.0.0.1", free_port("127.0.0.1"))
+        forget = self._controller.listen(self._offer_placing_picture)
+        try:
+            with ConsoleServer(console, access) as server:
+                yield server.link
+        finally:
+            forget()
+
+    def offer_overlay(
+        self, trial_id: str, take: int, obj: GraspObject, frame: DepthFrame, found: Registration
+    ) -> None:
+        """Put the registration's overlay on the shelf; drawn when looked at."""
+
+        def draw() -> bytes:
+            from registration.picture import save_picture
+
+            with TemporaryDirectory() as folder:
+                path = Path(folder) / "overlay.png"
+                save_picture(path, obj, frame, found)
+                return path.read_bytes()
+
+        self._shelf.put(trial_id, take, OVERLAY, draw)
+
+    def _offer_placing_picture(self) -> None:
+        """Put the picture of how to place the present object on the shelf; drawn when looked at."""
+        with self._controller.reading() as state:
+            trial = state.current_trial
+            if trial is None or not trial.takes:
+                return
+            take = trial.takes[-1].take
+        if PLACING in self._shelf.names(trial.trial_id, take):
             return
-        take = trial.takes[-1].take
-    if PICTURE in shelf.names(trial.trial_id, take):
-        return
-    obj = setup.objects[trial.planned.object_name]
-    pose = setup.plan.pose_of(setup.plan.grasp(trial.planned.grasp_id))
-    shelf.put(trial.trial_id, take, PICTURE, lambda: placing_picture(obj, pose))
-
-
-def placing_note(setup: Setup, trial_id: str) -> str:
-    """How to put the object of a trial down, in words."""
-    trial = next(t for t in setup.plan.trials if t.trial_id == trial_id)
-    pose = setup.plan.pose_of(setup.plan.grasp(trial.grasp_id))
-    return instruction(setup.objects[trial.object_name], pose)
+        obj = self._setup.objects[trial.planned.object_name]
+        pose = self._setup.plan.pose_of(self._setup.plan.grasp(trial.planned.grasp_id))
+        self._shelf.put(trial.trial_id, take, PLACING, lambda: placing_picture(obj, pose))

@@ -58,6 +58,12 @@ class SessionProgress:
         """Print a line above the progress."""
         self._console.print(message, markup=False, highlight=False)
 
+    def scoring(self, waiting: int) -> None:
+        """Tell how many takes still wait for their scores."""
+        self._bar.update(self._task, doing=f"scoring: {waiting} takes", left="-")
+        if not self._console.is_terminal and waiting % 25 == 0:
+            self.say(f"scoring: {waiting} takes left")
+
     def _look(self) -> None:
         with self._controller.reading() as state:
             counts, trial = state.counts(), state.current_trial

@@ -14,6 +14,8 @@ from typing import TYPE_CHECKING
 from collection.errors import CollectionError, DeviceError, PlacementError, Recovery
 from collection.trial import TrialContext, run_take
 from labeling.errors import SessionEndingError, TakeEndedError
+from logs.events import Paused
+from logs.state import STATION_HOLD
 from registration.errors import RegistrationError
 
 if TYPE_CHECKING:
@@ -83,6 +85,9 @@ class Session:
                 self.annotator.annotate(trial.trial_id, take)
 
     def _run_take(self, take: Take) -> None:
+        if not self.context.station.arm.state().ready:
+            self._recover()  # after a stop that somebody cleared, or a hold that somebody ended
+        self._show_lights()
         run_take(self.context, take, self.folder_of(take.trial_id, take.number))
 
     def _settle(self, work: TrialState, take: Take) -> None:
@@ -94,6 +99,7 @@ class Session:
     def _void(self, take: Take, error: Exception, times: int) -> None:
         """Give the take up; bring the station back, or wait for a person who can."""
         take.void(f"{type(error).__name__}: {error}")
+        self._show_lights()
         self.say(f"void: {error}")
         recovery = error.recovery if isinstance(error, DeviceError) else Recovery.VOID
         unready = isinstance(error, DeviceError) or not self.context.station.arm.state().ready
@@ -105,6 +111,11 @@ class Session:
             self._need_person(
                 TooManyVoidsError(f"void {times} times in a row, the last time because: {error}")
             )
+
+    def _show_lights(self) -> None:
+        arm, camera = self.context.station.arm.state(), self.context.station.camera.state()
+        self.controller.set_light("robot", arm.ready, arm.error or "")
+        self.controller.set_light("camera", camera.connected, camera.detail)
 
     def _recover(self) -> Recovery:
         """Re-initialize the devices after a fault; HALT if only a person can help."""
@@ -124,4 +135,7 @@ class Session:
     def _need_person(self, error: Exception) -> None:
         if not self.attended:
             raise error
-        self.controller.hold("station", str(error))
+        with self.controller.reading() as state:
+            source = state.segments[-1].source
+        self.controller.hold(STATION_HOLD, str(error))
+        self.controller.record(Paused(operator="the station", source=source))

@@ -12,7 +12,7 @@ import hashlib
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 
@@ -40,6 +40,16 @@ if TYPE_CHECKING:
     from registration.frame import DepthFrame
 
 
+class OverlayListener(Protocol):
+    """Is shown where the object was found; must not take the trial's time."""
+
+    def __call__(
+        self, trial_id: str, take: int, obj: GraspObject, frame: DepthFrame, found: Registration
+    ) -> None:
+        """Keep what is needed to draw it."""
+        ...
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class TrialContext:
     """What all trials of a session share.
@@ -52,6 +62,7 @@ class TrialContext:
         plan: of the session.
         objects: by name.
         versions: of the software.
+        offer_overlay: given each registration, for the operator's eyes.
     """
 
     session_id: str
@@ -61,6 +72,7 @@ class TrialContext:
     plan: Plan
     objects: Mapping[str, GraspObject]
     versions: Mapping[str, str]
+    offer_overlay: OverlayListener | None = None
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -190,6 +202,9 @@ def _register(attempt: _Attempt, frame: DepthFrame, recorder: TrialRecorder) -> 
     attempt.take.advance(Phase.REGISTER)
     recorder.phase("register")
     found = register(attempt.obj, frame, stable_pose=attempt.pose.index, seed=attempt.seed)
+    offer = attempt.context.offer_overlay
+    if offer is not None:
+        offer(attempt.take.trial_id, attempt.take.number, attempt.obj, frame, found)
     if found.contradicts_declared:
         recorder.registration(mapping.registration_record(found, frame.time_ns))
         raise PlacementError(
@@ -201,7 +216,20 @@ def _register(attempt: _Attempt, frame: DepthFrame, recorder: TrialRecorder) -> 
     if found.ambiguous and not found.same_grasp_outcome(attempt.obj, planned):
         T_world_object = _ask(attempt, found, recorder)
     recorder.registration(mapping.registration_record(found, frame.time_ns, T_world_object))
+    attempt.take.show({"registration": _quality(found)})
     return T_world_object
+
+
+def _quality(found: Registration) -> dict[str, Any]:
+    """What the operator's page tells about a registration."""
+    return {
+        "render_cost": found.render_cost,
+        "margin": found.margin,
+        "fitness": found.fitness,
+        "rmse_mm": found.rmse * 1e3,
+        "ambiguous": found.ambiguous,
+        "not_seen": list(found.unobservable),
+    }
 
 
 def _ask(attempt: _Attempt, found: Registration, recorder: TrialRecorder) -> FloatArray:
@@ -209,7 +237,7 @@ def _ask(attempt: _Attempt, found: Registration, recorder: TrialRecorder) -> Flo
     poses = [found.T_world_object, *(rival.T_world_object for rival in found.rivals)]
     chosen = attempt.take.confirm_pose(
         {
-            "margin": found.margin,
+            "registration": _quality(found),
             "poses": [pose.tolist() for pose in poses],
             "rivals": [
                 {"render_cost": rival.render_cost, "stable_pose": rival.stable_pose}

@@ -15,6 +15,10 @@ from logs.trial_state import Counts, PlannedEntry, TakeState, TakeStatus, TrialS
 __all__ = ["Counts", "PlannedEntry", "SessionState", "TakeState", "TrialState"]
 
 
+STATION_HOLD = "station"
+"""Cause of a hold that a person ends, with Resume, after having looked at the station."""
+
+
 class SessionState:
     """The fold. Feed it entries in order; read it at any time.
 
@@ -120,6 +124,7 @@ class SessionState:
                 self.paused = True
             case ev.Resumed():
                 self.paused = False
+                self.holds.pop(STATION_HOLD, None)
             case ev.Held():
                 self.holds[event.cause] = event.text
             case ev.Released():
