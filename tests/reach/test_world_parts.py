@@ -115,11 +115,12 @@ def test_world_parameters_refuse_nonsense() -> None:
         WorldParameters(timestep=0.0)
 
 
-@pytest.mark.skipif(
-    not Path(os.environ.get("REACH_DATA", "/nonexistent")).is_dir(),
-    reason="REACH_DATA names no folder with real meshes",
-)
-def test_real_meshes_decompose() -> None:
-    folder = Path(os.environ["REACH_DATA"])
-    obj = GraspObject.load(folder / "meshes" / "cube_3cm.obj", mass=0.003)
-    assert len(convex_parts(obj)) == 1
+PUBLISHED = Path(os.environ.get("REACH_PUBLISHED", Path(__file__).parents[3] / "shared" / "data"))
+
+
+@pytest.mark.skipif(not PUBLISHED.is_dir(), reason=f"no published meshes in {PUBLISHED}")
+@pytest.mark.parametrize("name", ["cube_3cm", "robosuite_lemon"])
+def test_published_convex_meshes_stay_whole(name: str, own_cache: Path) -> None:
+    obj = GraspObject.load(PUBLISHED / "meshes" / f"{name}.obj")
+    ((vertices, faces),) = convex_parts(obj)
+    assert trimesh.Trimesh(vertices, faces).volume == pytest.approx(obj.volume, rel=6e-3)
