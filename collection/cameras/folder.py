@@ -151,7 +151,7 @@ class FolderCamera:
         while True:
             now = set(self._look())
             whole = [file for file in now & before if file.modified_ns >= asked_ns]
-            for file in sorted(whole, key=lambda each: -each.modified_ns):
+            for file in sorted(whole, key=lambda each: (-each.modified_ns, each.path.name)):
                 try:
                     return read_frame(
                         file.path,

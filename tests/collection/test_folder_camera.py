@@ -71,10 +71,10 @@ class Drop:
         self._pending.append((self._clock.now_ns() + round(seconds * NANOSECONDS), make))
 
     def _pass(self, seconds: float) -> None:
-        due = [make for at, make in self._pending if at <= self._clock.now_ns()]
+        due = [(at, make) for at, make in self._pending if at <= self._clock.now_ns()]
         self._pending = [(at, m) for at, m in self._pending if at > self._clock.now_ns()]
-        for make in due:
-            stamp(make(), self._clock.now_ns())
+        for at, make in due:
+            stamp(make(), at)
 
 
 def stamp(path: Path, time_ns: int) -> Path:
