@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from reach.models.area import AreaContact
     from reach.models.ellipse import EllipseContact
     from reach.models.point import PointContact
+    from reach.models.settled import SettledContact
     from reach.objects import GraspObject
     from reach.pose_error import PoseError
     from reach.reliability import reliability
@@ -33,6 +34,7 @@ _HOME = {
     "PoseError": "reach.pose_error",
     "ReachError": "reach.errors",
     "Scene": "reach.scene",
+    "SettledContact": "reach.models.settled",
     "reliability": "reach.reliability",
 }
 
@@ -47,6 +49,7 @@ __all__ = [
     "PoseError",
     "ReachError",
     "Scene",
+    "SettledContact",
     "reliability",
 ]
 

@@ -1,0 +1,89 @@
+"""What the settled model answers: the verdict, and what the part did before it rested."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import StrEnum
+
+import numpy as np
+
+from reach.arrays import FloatArray
+from reach.contact import Reason, Verdict
+
+
+class Fate(StrEnum):
+    """How a grasp ends, in the order of the kernel's codes."""
+
+    HELD = "held"
+    NO_CONTACT = "no contact"
+    SQUEEZED_OUT = "squeezed out"
+    STILL_SLIDING = "still sliding"
+    SLIPPED_ON_LIFT = "slipped on lift"
+
+
+FATES = tuple(Fate)
+REASON_OF = (Reason.HOLDS, Reason.NO_CONTACT, Reason.SLIPS, Reason.SLIPS, Reason.SLIPS)
+"""Reason of each fate."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Settlement:
+    """How the part moved between the jaws.
+
+    Attributes:
+        fate: how it ended.
+        translation: of the center of mass while the table carried the part [m].
+        yaw: rotation about the table's normal in that time [rad].
+        path: T_world_object at every step, as if the hand had not risen, shape (P, 4, 4).
+        rest: index in `path` of the pose in which the lift began.
+        preload_share: preload over the most that friction could oppose to it; 1 is the limit.
+        area: of the lesser jaw's patch at the pad's deformable depth [m^2].
+        inside: distance of the pressures' centers from the pads' outline, the lesser [m].
+        lift_motion: of the part in the hand while it was lifted [m].
+    """
+
+    fate: Fate
+    translation: float
+    yaw: float
+    path: FloatArray
+    rest: int
+    preload_share: float
+    area: float
+    inside: float
+    lift_motion: float
+
+    @property
+    def T_world_object(self) -> FloatArray:
+        """Pose of the settled part, before the lift, shape (4, 4)."""
+        pose: FloatArray = self.path[self.rest]
+        return pose
+
+    def thinned(self, most: int = 12) -> FloatArray:
+        """At most so many poses of the path, first, rest and last among them, shape (K, 4, 4)."""
+        count = len(self.path)
+        kept = np.linspace(0, count - 1, min(most - 1, count)).round().astype(int)
+        chosen: FloatArray = self.path[np.unique(np.append(kept, self.rest))]
+        return chosen
+
+
+@dataclass(frozen=True, eq=False)
+class SettledVerdict(Verdict):
+    """A verdict that knows what happened before."""
+
+    settlement: Settlement | None = None
+
+    @property
+    def explanation(self) -> str:
+        """One sentence for a person."""
+        if self.settlement is None or self.settlement.fate is Fate.NO_CONTACT:
+            return super().explanation
+        path = self.settlement
+        way = f"{path.translation * 1e3:.1f} mm and {np.degrees(path.yaw):.1f} deg"
+        if path.fate is Fate.SQUEEZED_OUT:
+            return f"squeezed out of the jaws after {way}"
+        if path.fate is Fate.STILL_SLIDING:
+            return f"still sliding after {way}"
+        stood = "rests as it lay" if len(path.path[: path.rest + 1]) == 1 else f"settles by {way}"
+        if path.fate is Fate.SLIPPED_ON_LIFT:
+            return f"{stood}, slips on the lift: carries {self.margin:.3g} of the part's weight"
+        return f"{stood}, holds {self.margin:.3g} times gravity"
