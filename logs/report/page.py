@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from reach.evaluation.cases import GraspCase
     from reach.pose_error import PoseError
 
-PROBES = 350
+PROBES = 280
 MAP_SIZE = (520, 420)
 
 
@@ -86,9 +86,9 @@ def _facts(dataset: Dataset, result: Evaluation) -> dict[str, Any]:
 
 
 def _example_case(result: Evaluation) -> GraspCase | None:
-    """The grasp whose patch is shown: reliable in the trials, and of the largest overlap."""
-    overlap = result.row("overlap").scores
-    rated = [(case.rate, overlap[i], i) for i, case in enumerate(result.cases)]
+    """The grasp whose patch is shown: held in the trials and by the model, of large overlap."""
+    model, overlap = sections.preferred(result).scores, result.row("overlap").scores
+    rated = [(case.rate * model[i], overlap[i], i) for i, case in enumerate(result.cases)]
     return result.cases[max(rated)[2]] if rated else None
 
 

@@ -84,7 +84,7 @@ def reliabilities(
     probes: ProbeGrasps,
     pose_error: PoseError,
     *,
-    samples: int = 25,
+    samples: int = 20,
     seed: int = 0,
 ) -> FloatArray:
     """Reliability of each probe grasp under a model, shape (N,)."""

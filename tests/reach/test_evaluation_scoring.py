@@ -160,6 +160,10 @@ def test_real_models_score_the_same_in_threads_as_in_order():
 
 
 @pytest.mark.slow
+@pytest.mark.skipif(
+    os.environ.get("REACH_SLOW") != "1",
+    reason="two processes load all libraries anew; the cluster test covers it (REACH_SLOW=1 runs it)",
+)
 def test_processes_give_the_same():
     some, scorer = cases(objects=1, grasps=4), make_scorer("point-robust", samples=10)
     serial = score_cases(some, scorer, pose_error=ERROR, use_cache=False)
