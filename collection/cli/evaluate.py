@@ -13,7 +13,9 @@ if TYPE_CHECKING:
     from reach.evaluation.table import Evaluation
     from reach.pose_error import PoseError
 
-DEFAULT_MODELS = "point,point-robust,ellipse,ellipse-robust,reach,reach-robust"
+DEFAULT_MODELS = (
+    "point,point-robust,ellipse,ellipse-robust,reach,reach-robust,settled,settled-robust"
+)
 MODELS_HELP = "Comma-separated model names; `all` takes every one, also the slow `dynamic`."
 
 
