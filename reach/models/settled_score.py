@@ -151,7 +151,9 @@ class SettledRobustScorer(_ManyScores):
         error = pose_error or self.default_pose_error
         told = self.settled_samples(scene, grasp, error, seed)
         held = told.margin >= 1.0
-        chance = held.astype(float) if self.grade is None else self.grade.chances(scene, told)
+        chance = (
+            held.astype(float) if self.grade is None else self.grade.chances(scene.gripper, told)
+        )
         low, high = wilson_interval(int(held.sum()), len(held))
         counts = Counter(str(FATES[code]) for code in told.fate)
         details: dict[str, Any] = {

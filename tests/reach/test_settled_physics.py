@@ -1,0 +1,199 @@
+"""The settled model on cases with a known answer: what aligns, what jams, what is squeezed out."""
+
+import numpy as np
+import pytest
+import trimesh
+
+from reach import Grasp, GraspObject, ParallelJawGripper, Scene, SettledContact, transforms
+from reach.contact import Reason
+from reach.models.settled import FOUNDATION_STIFFNESS
+from reach.models.settled_verdict import Fate
+from reach.raycast import RaycastScene
+from reach.world.parameters import WorldParameters
+
+YUMI = ParallelJawGripper.yumi()
+FORCE = 20.0
+
+
+def part_of(mesh, mass=0.03, name="part"):
+    return GraspObject(name, mesh.vertices, mesh.faces, mass)
+
+
+def cube(edge=0.03, mass=0.03):
+    return part_of(trimesh.creation.box((edge, edge, edge)), mass, "cube")
+
+
+def wedge(half_angle, length=0.04, width=0.02):
+    """A prism whose two pressed faces meet the closing axis x at a half angle; thick at low y."""
+    thick = width / 2 + length / 2 * np.tan(half_angle)
+    thin = width / 2 - length / 2 * np.tan(half_angle)
+    h, y = 0.015, length / 2
+    corners = [
+        (sx * w, sy, z) for sx in (-1, 1) for w, sy in ((thick, -y), (thin, y)) for z in (-h, h)
+    ]
+    return part_of(trimesh.convex.convex_hull(corners), name="wedge")
+
+
+def cylinder(radius=0.012):
+    return part_of(trimesh.creation.cylinder(radius, 0.04, sections=256), name="cylinder")
+
+
+def ball(radius=0.015):
+    return part_of(trimesh.creation.icosphere(4, radius), name="ball")
+
+
+def from_above(yaw=0.0, x=0.0, y=0.0, z=0.0):
+    """A grasp straight down, its pads' origins about a point of the part, turned by yaw."""
+    down = transforms.rotation_about((0, 0, 1), yaw) @ np.diag([1.0, -1.0, -1.0])
+    return Grasp(transforms.make_transform(down, (x, y, z + 0.160098)), force=FORCE)
+
+
+def judged(part, grasp, **parameters):
+    return SettledContact(**parameters).evaluate(Scene(part, YUMI, np.eye(4)), grasp)
+
+
+def test_pads_are_those_of_the_pin_world():
+    assert WorldParameters().foundation_modulus == pytest.approx(FOUNDATION_STIFFNESS)
+
+
+def test_a_flat_face_is_pressed_uniformly_by_the_closing_force():
+    verdict = judged(cube(), from_above())
+    for patch in verdict.patches:
+        assert np.ptp(patch.pressures) < 1e-6 * FORCE / patch.area
+        assert patch.pressures.mean() * patch.area == pytest.approx(FORCE)
+    assert verdict.settlement.translation == verdict.settlement.yaw == 0.0
+
+
+def test_low_friction_lets_a_turned_cube_align():
+    verdict = judged(cube(), from_above(np.radians(20)), friction=0.3)
+    assert verdict.resists and verdict.settlement.fate is Fate.HELD
+    assert 17 < np.degrees(verdict.settlement.yaw) < 21
+    assert "settles by" in verdict.explanation
+
+
+def test_high_friction_jams_a_turned_cube_where_it_lies():
+    """Two opposite edges at 45 - 20 degrees to the closing axis jam, as two points, above a friction
+    of tan 25 deg = .47; soft pads press beside the edges as well, and jam above .41."""
+    verdict = judged(cube(), from_above(np.radians(20)), friction=0.5)
+    assert verdict.resists
+    assert np.degrees(verdict.settlement.yaw) < 2
+    assert "rests as it lay" in verdict.explanation
+    assert verdict.settlement.preload_share < 1
+
+
+def test_a_cube_at_45_degrees_is_held_on_its_edges():
+    verdict = judged(cube(), from_above(np.radians(45)), friction=0.3)
+    assert verdict.resists
+    assert verdict.settlement.yaw == 0.0
+    for patch in verdict.patches:
+        assert patch.area < 0.6 * YUMI.jaws[0].pad.area
+
+
+@pytest.mark.parametrize("friction", [0.2, 0.4])
+def test_a_wedge_is_squeezed_out_beyond_the_friction_angle_and_not_below(friction):
+    limit = np.arctan(friction)
+    held = judged(wedge(limit - np.radians(1.5)), from_above(), friction=friction)
+    lost = judged(wedge(limit + np.radians(1.5)), from_above(), friction=friction)
+    assert held.resists and held.settlement.translation < 1e-3
+    assert lost.settlement.fate is Fate.SQUEEZED_OUT and not lost.resists
+    assert lost.reason is Reason.SLIPS and "squeezed out" in lost.explanation
+    moved = lost.settlement.path[-1][:3, 3]
+    assert moved[1] < -0.01 and abs(moved[0]) < 1e-3  # the thick end leaves, along the table
+
+
+def test_a_wedges_preload_is_that_of_two_inclined_planes():
+    angle = np.radians(10)
+    verdict = judged(wedge(angle), from_above(), friction=0.4)
+    total = sum(patch.force_object for patch in verdict.patches)
+    # The jaws come from both sides, so that only the push toward the thick end is left.
+    assert total[0] == pytest.approx(0.0, abs=1e-6)
+    assert total[1] == pytest.approx(-2 * FORCE * np.tan(angle), rel=1e-3)
+    assert verdict.settlement.preload_share == pytest.approx(np.tan(angle) / 0.4, rel=0.03)
+
+
+@pytest.mark.parametrize("offset", [-0.005, 0.003, 0.006])
+def test_a_cylinder_does_not_care_where_between_the_pads_it_stands(offset):
+    verdict = judged(cylinder(), from_above(y=offset), friction=0.3)
+    assert verdict.resists
+    assert verdict.settlement.translation == 0.0
+    assert verdict.settlement.preload_share < 0.1
+
+
+@pytest.mark.parametrize("offset", [-0.0115, 0.0115])
+def test_a_frictionless_cylinder_is_expelled_once_the_rim_cuts_its_patch(offset):
+    verdict = judged(cylinder(), from_above(y=offset), friction=0.0)
+    assert verdict.settlement.fate is Fate.SQUEEZED_OUT
+    assert verdict.settlement.path[-1][1, 3] * -offset > 0  # away from the pads
+
+
+def test_a_frictionless_ball_stays_on_the_table_and_is_not_lifted():
+    inside = judged(ball(), from_above(y=0.004), friction=0.0)
+    assert inside.settlement.translation < 2e-4
+    assert inside.settlement.fate is Fate.SLIPPED_ON_LIFT
+    cut = judged(ball(), from_above(y=0.0112), friction=0.0)
+    assert cut.settlement.fate is Fate.SQUEEZED_OUT
+
+
+def test_jaws_off_center_along_the_closing_axis_change_nothing():
+    """The jaws are coupled: the part shifts until both press."""
+    reference = judged(cube(), from_above(np.radians(10)), friction=0.3)
+    for x in (-0.008, 0.003, 0.008):
+        shifted = judged(cube(), from_above(np.radians(10), x=x), friction=0.3)
+        assert shifted.settlement.yaw == pytest.approx(reference.settlement.yaw, rel=1e-6)
+        assert shifted.margin == pytest.approx(reference.margin, rel=1e-6)
+
+
+def test_the_lift_adds_the_weight():
+    heavy = judged(cube(mass=5.0), from_above())
+    assert heavy.settlement.fate is Fate.SLIPPED_ON_LIFT and heavy.margin < 1
+    assert "slips on the lift" in heavy.explanation
+    carried = judged(cube(mass=1.0), from_above())
+    assert carried.margin == pytest.approx(2 * 0.4 * FORCE / 9.81, rel=0.15)
+
+
+def test_jaws_that_meet_nothing_say_so():
+    verdict = judged(cube(), from_above(y=0.1))
+    assert verdict.settlement.fate is Fate.NO_CONTACT and verdict.reason is Reason.NO_CONTACT
+    assert verdict.missing_jaws == (0, 1) and verdict.explanation == "no contact on jaws 0 and 1"
+    assert verdict.patches == ()
+
+
+def potential(part, T_object_gripper, cell=2.5e-4):
+    """Energy of both pads less f_C times their travel [J], by rays on a grid of columns."""
+    raycast, total = RaycastScene(part.vertices, part.faces), 0.0
+    for jaw in range(2):
+        low, high = YUMI.jaws[jaw].pad.polygon.min(axis=0), YUMI.jaws[jaw].pad.polygon.max(axis=0)
+        xs, ys = (np.arange(a + cell / 2, b, cell) for a, b in zip(low, high, strict=True))
+        grid = np.stack(np.meshgrid(xs, ys, indexing="ij"), axis=-1).reshape(-1, 2)
+        corner_cut = np.maximum(0, grid[:, 0] - 0.005) + np.maximum(0, np.abs(grid[:, 1]) - 0.005)
+        grid = grid[corner_cut < 0.005]  # YuMi's outline
+        T = T_object_gripper @ YUMI.T_gripper_pad(jaw)
+        starts = grid @ T[:3, :2].T + T[:3, 3]
+        depth, _ = raycast.cast(starts, np.broadcast_to(T[:3, 2], starts.shape))
+        z = depth[np.isfinite(depth)]
+        least, most = z.min(), z.min() + 0.02
+        for _ in range(60):
+            middle = 0.5 * (least + most)
+            push = FOUNDATION_STIFFNESS * cell**2 * np.maximum(0, middle - z).sum()
+            least, most = (middle, most) if push < FORCE else (least, middle)
+        energy = 0.5 * FOUNDATION_STIFFNESS * cell**2 * (np.maximum(0, middle - z) ** 2).sum()
+        total += energy - FORCE * middle
+    return total
+
+
+@pytest.mark.parametrize("case", ["cube", "wedge"])
+def test_without_friction_the_potential_never_rises_while_settling(case):
+    """Computed by rays, independently of the kernels."""
+    part = cube() if case == "cube" else wedge(np.radians(12))
+    grasp = from_above(np.radians(20)) if case == "cube" else from_above(y=-0.004)
+    settlement = judged(part, grasp, friction=0.0).settlement
+    on_table = settlement.path[: settlement.rest + 1]
+    if settlement.fate is Fate.SQUEEZED_OUT:
+        on_table = on_table[:-1]  # in the last pose a pad is empty
+    values = np.array(
+        [potential(part, transforms.inverse(T) @ grasp.T_object_gripper) for T in on_table]
+    )
+    assert len(values) > 10
+    drop = values[0] - values[-1]
+    assert drop > 1e-3
+    assert np.diff(values).max() < 2e-3 * drop
