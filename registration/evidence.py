@@ -7,7 +7,8 @@ import numpy as np
 from reach.arrays import FloatArray
 from registration.mesh_model import MeshModel
 from registration.observation import FOREIGN, NO_RETURN, PART, Observation
-from registration.render_check import GRAZING, Rendered, render
+from registration.render_check import GRAZING
+from registration.rendering import Rendered, render
 
 FEW_PIXELS = 12
 """So many differing pixels of full disagreement make a margin of one half."""

@@ -11,7 +11,7 @@ from reach.stable_poses import StablePose
 from reach.transforms import make_transform, rotation_about
 from registration.mesh_model import MeshModel
 from registration.observation import Observation
-from registration.render_check import render, visible_centroids
+from registration.rendering import render, visible_centroids
 
 YAWS = 72
 """Turns about the table's normal tried for each stable pose."""

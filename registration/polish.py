@@ -18,7 +18,7 @@ from registration.observation import Observation
 from registration.options import SensorProfile
 
 POINTS = 1500
-STEPS = 6
+STEPS = 4
 TILT_SLACK, HEIGHT_SLACK = np.radians(0.4), 2e-4
 """How far a part on a real table may be from its ideal stable pose: standard deviations [rad, m]."""
 PRINT_ERROR = 3e-5

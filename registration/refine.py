@@ -26,6 +26,8 @@ TURNS = np.radians([1.0, 2.5, 6.0, 12.0])
 SHIFT = 2.0
 """Slides tried, in units of the noise."""
 ROUNDS = 3
+PIXELS = 2000
+"""Pixels of the part that the pattern search looks at, about."""
 GAIN = 0.003
 """A pattern step must lower the render cost by this much to be worth leaving the fitted pose."""
 
@@ -114,17 +116,25 @@ def _fitted(job: Job, start: Hypothesis) -> Hypothesis:
 
 def _settle(start: Hypothesis, up_camera: FloatArray, com: FloatArray, noise: float) -> Hypothesis:
     """Pattern search of the render cost over turns and slides on the table."""
-    best, search = start, start.search
+    search = start.search
+    best = replace(start, cost=_coarse_cost(start))
+    start = best
     for halvings in range(ROUNDS):
         shrink = 0.5**halvings
         T = _neighbors(best.T_camera_object, up_camera, com, shrink, SHIFT * noise * shrink)
-        cost = search.check(T).cost
+        cost = search.check(T, PIXELS).cost
         least = int(np.argmin(cost))
         if cost[least] < best.cost - GAIN / 2:
             best = replace(best, T_camera_object=T[least], cost=float(cost[least]))
         elif best is start and halvings > 0:
             break
-    return best
+    if best is start:
+        return best
+    return replace(best, cost=float(search.check(best.T_camera_object[None]).cost[0]))
+
+
+def _coarse_cost(hypothesis: Hypothesis) -> float:
+    return float(hypothesis.search.check(hypothesis.T_camera_object[None], PIXELS).cost[0])
 
 
 def _neighbors(

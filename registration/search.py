@@ -130,9 +130,9 @@ class Search:
             for i in np.argsort(check.cost, kind="stable")
         ]
 
-    def check(self, T_camera_object: FloatArray) -> RenderCheck:
-        """High-resolution render check of hypotheses (N, 4, 4)."""
-        return self._render(T_camera_object, FINE_PIXELS)
+    def check(self, T_camera_object: FloatArray, pixels: int = FINE_PIXELS) -> RenderCheck:
+        """High-resolution render check of hypotheses (N, 4, 4) on about so many pixels."""
+        return self._render(T_camera_object, pixels)
 
     def _render(self, T_camera_object: FloatArray, pixels: int) -> RenderCheck:
         stride = max(1, round(float(np.sqrt(len(self.seen.points) / pixels))))
