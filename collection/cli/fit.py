@@ -55,7 +55,7 @@ def fit(
     if as_json:
         print(json.dumps(_content(found, scatter, model, dataset.simulated)))
         return
-    print("\n".join([*_likelihood_lines(found), *_registration_lines(scatter)]))
+    print("\n".join([*_likelihood_lines(found, model), *_registration_lines(scatter)]))
 
 
 def _content(
@@ -77,7 +77,7 @@ def _content(
     }
 
 
-def _likelihood_lines(found: Fit) -> list[str]:
+def _likelihood_lines(found: Fit, model: str) -> list[str]:
     lines = [
         f"{found.trials} labels of {found.grasps} grasps; grasps scatter "
         f"{found.overdispersion:.1f} times as much as chance alone"
@@ -89,6 +89,12 @@ def _likelihood_lines(found: Fit) -> list[str]:
             lines.append(
                 f"{label}: the data cannot tell (all of {one.low:g} to {one.high:g}{unit} is as "
                 "likely)"
+            )
+            continue
+        if one.low == one.high and not (one.bounded_below and one.bounded_above):
+            lines.append(
+                f"{label}: at the end of the range searched ({one.best:g}{unit}): {model} does not "
+                "describe these labels, do not use the value"
             )
             continue
         low = f"{one.low:g}" if one.bounded_below else f"below {one.low:g}"
@@ -116,7 +122,8 @@ def _registration_lines(scatter: RegistrationScatter) -> list[str]:
 
 
 def _spread_line(name: str, spread: Spread, unit: str) -> str:
+    bias = "" if name.startswith("true") else f"mean {spread.bias:+.2g}, "
     return (
         f"{name}: {spread.value:.2g}{unit}, 95 %: {spread.low:.2g} to {spread.high:.2g}{unit} "
-        f"(mean {spread.bias:+.2g}, {spread.count} values)"
+        f"({bias}{spread.count} values)"
     )
