@@ -145,3 +145,11 @@ class DuplicateNameError(PlanError):
 
 class NoGraspError(PlanError):
     """A part that the gripper cannot hold in any way it can lie."""
+
+
+class PlacementError(CollectionError):
+    """The object lies otherwise than planned, or out of reach: it is put down again."""
+
+
+class OptionsError(CollectionError, InvalidInputError):
+    """An option of a session that is missing, impossible, or contradicts the session's own."""

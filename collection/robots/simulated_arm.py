@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Self
 
 import numpy as np
@@ -142,8 +142,18 @@ class SimulatedArm:
         return self._execute(joint_path, speed, guarded=guarded, on_sample=on_sample)
 
     def home(self, *, speed: Speed, on_sample: ArmListener | None = None) -> Motion:
-        """Move to the home configuration."""
-        return self.move_to_joints(self._planner.arm.home, speed=speed, on_sample=on_sample)
+        """Move to the home configuration, around what is in the way.
+
+        Raises:
+            UnsafeMotionError: no way there was found; nothing moved.
+        """
+        from collection.robots.detour import detour
+
+        legs = [
+            self.move_to_joints(path.joints[-1], speed=speed, on_sample=on_sample)
+            for path in detour(self._planner, self._joints, self._planner.arm.home)
+        ]
+        return replace(legs[-1], start_ns=legs[0].start_ns)
 
     def stop(self) -> None:
         """Stop any motion now."""
