@@ -141,13 +141,7 @@ class Annotator:
                 scored_event(waiting.trial_id, waiting.take, prediction)
             )
             self._mirror_fresh(but=entry.seq)
-            self._mirror.note(
-                entry,
-                patches=prediction.patches,
-                parameters={name: str(value) for name, value in prediction.parameters.items()},
-                seconds=prediction.score.seconds,
-                explanation=str(prediction.score.details.get("reason", "")),
-            )
+            mirror_score(self._mirror, entry, prediction)
         self._views.append(self._pool.submit(_derive_view, waiting.folder))
 
     def _mirror_fresh(self, but: int | None = None) -> None:
@@ -172,6 +166,17 @@ def scored_event(trial_id: str, take: int, prediction: Prediction) -> Scored:
         version=prediction.version,
         value=prediction.score.value,
         details=details,
+    )
+
+
+def mirror_score(mirror: AnnotationMirror, entry: Entry, prediction: Prediction) -> None:
+    """Write a stored prediction's annotation file, contacts included."""
+    mirror.note(
+        entry,
+        patches=prediction.patches,
+        parameters={name: str(value) for name, value in prediction.parameters.items()},
+        seconds=prediction.score.seconds,
+        explanation=str(prediction.score.details.get("reason", "")),
     )
 
 

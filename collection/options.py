@@ -6,7 +6,16 @@ from typing import Annotated, Literal
 
 from pydantic import BaseModel, ConfigDict, Field
 
-DEFAULT_MODELS = ("reach", "reach-robust", "point", "point-robust", "ellipse", "ellipse-robust")
+DEFAULT_MODELS = (
+    "reach",
+    "reach-robust",
+    "point",
+    "point-robust",
+    "ellipse",
+    "ellipse-robust",
+    "settled",
+    "settled-robust",
+)
 """Models whose predictions annotate every trial."""
 
 OperatorKind = Literal["auto", "web", "terminal"]

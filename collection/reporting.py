@@ -12,7 +12,16 @@ from reach.errors import InvalidInputError
 if TYPE_CHECKING:
     from reach.evaluation.table import Evaluation
 
-REPORT_MODELS = ("point", "point-robust", "ellipse", "ellipse-robust", "reach", "reach-robust")
+REPORT_MODELS = (
+    "point",
+    "point-robust",
+    "ellipse",
+    "ellipse-robust",
+    "reach",
+    "reach-robust",
+    "settled",
+    "settled-robust",
+)
 
 
 def write_report(

@@ -25,6 +25,7 @@ from reach.objects import GraspObject
 
 if TYPE_CHECKING:
     from collection.station import Station
+    from reach.pose_error import PoseError
 
 OBJECTS = "objects"
 RAYS_PER_GRASP, LEAST_BATCH = 20, 200
@@ -140,6 +141,14 @@ def resolved_station(station: Station) -> dict[str, Any]:
     if calibration is not None:
         sections["camera"]["calibrated"] = calibration.model_dump(mode="json")
     return {"name": config.name, **sections}
+
+
+def stated_pose_error(folder: SessionFolder) -> PoseError:
+    """What a session's station stated of calibration and actuation, as the models are told."""
+    from collection.station import PoseErrorConfig
+
+    station: Any = folder.descriptor.config["station"]
+    return PoseErrorConfig.model_validate(station["pose_error"]).total()
 
 
 def fingerprints(station: Station, plan: Plan) -> dict[str, str]:

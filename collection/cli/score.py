@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -21,9 +22,12 @@ DEFAULT_MODELS = "reach,reach-robust,point,point-robust,ellipse,ellipse-robust"
 
 
 def score(
+    sessions: Annotated[
+        list[Path] | None, typer.Argument(help="Recorded sessions to add new scores to.")
+    ] = None,
     grasps: Annotated[
-        Path, typer.Option(help="JSON of `reach sample --json`, or a list of 4 x 4 poses.")
-    ],
+        Path | None, typer.Option(help="JSON of `reach sample --json`, or a list of 4 x 4 poses.")
+    ] = None,
     mesh: Annotated[
         str | None,
         typer.Option(help="A mesh file or a built-in part's name; the grasps' own if left out."),
@@ -41,22 +45,27 @@ def score(
     seed: Annotated[int, typer.Option(min=0, help="Of the robust models' samples.")] = 0,
     as_json: Annotated[bool, typer.Option("--json", help="Print JSON.")] = False,
 ) -> None:
-    """Score grasps on a part with contact models.
+    """Score grasps on a part with contact models, or the recorded trials of sessions anew.
 
     - `reach sample --mesh bracket --json > grasps.json`
     - `reach score --mesh bracket --grasps grasps.json`
     - `reach score --mesh part.stl --mesh-unit mm --grasps g.json --models reach,reach-robust --json`
     - `reach score --grasps grasps.json --models reach-robust --pose-error 0.002,0.02`
+    - `reach score sessions/monday --models settled,settled-robust`
     """
+    names = [name.strip() for name in models.split(",") if name.strip()]
+    if sessions:
+        _score_sessions(sessions, names, grasps, as_json=as_json)
+        return
     from collection.grasp_file import grasps_of, read_grasp_file
     from collection.objects import load_object
     from reach.models.registry import make_scorer
 
-    scorers = [make_scorer(name.strip()) for name in models.split(",") if name.strip()]
+    scorers = [make_scorer(name) for name in names]
     error = parse_pose_error(pose_error)
-    document = read_grasp_file(grasps)
+    document = read_grasp_file(_given(grasps))
     part = load_object(
-        _mesh_name(document, mesh, grasps),
+        _mesh_name(document, mesh, _given(grasps)),
         mesh_unit=mesh_unit or (document.mesh_unit if mesh is None else "m"),
         mass=mass,
     )
@@ -69,6 +78,37 @@ def score(
         typer.echo(json.dumps(score_document(part, scorers, scores)))
     else:
         _print_table(part, scores)
+
+
+def _given(grasps: Path | None) -> Path:
+    from reach.errors import InvalidInputError
+
+    if grasps is None:
+        raise InvalidInputError("give --grasps FILE, or recorded sessions to score anew")
+    return grasps
+
+
+def _score_sessions(
+    sessions: Sequence[Path], names: Sequence[str], grasps: Path | None, *, as_json: bool
+) -> None:
+    from collection.cli.evaluation_table import progress_bars
+    from collection.rescoring import rescore
+    from reach.errors import InvalidInputError
+    from reach.models.registry import make_scorer
+
+    if grasps is not None:
+        raise InvalidInputError("--grasps and sessions exclude each other")
+    for name in names:
+        make_scorer(name)  # an unknown name is refused before anything is written
+    counts = {}
+    with progress_bars() as progress:
+        for session in sessions:
+            counts[str(session)] = rescore(session, names, partial(progress, session.name))
+    if as_json:
+        typer.echo(json.dumps({"scored_takes": counts, "models": list(names)}))
+        return
+    for name, count in counts.items():
+        typer.echo(f"{name}: {count} takes scored with {', '.join(names)}")
 
 
 def parse_pose_error(text: str | None) -> PoseError | None:

@@ -11,6 +11,7 @@ from pathlib import Path
 import pytest
 
 from collection.cli.main import main
+from collection.options import DEFAULT_MODELS
 from logs.events import Executed, Labelled, Scored, Source
 from logs.journal import read_journal
 from logs.session import SessionFolder
@@ -18,7 +19,7 @@ from logs.trial_record import read_record
 
 REACH = Path(sys.executable).with_name("reach")
 OBJECTS, GRASPS, REPEATS = "cube_3cm,bracket", 2, 1
-MODELS = {"reach", "reach-robust", "point", "point-robust", "ellipse", "ellipse-robust"}
+MODELS = set(DEFAULT_MODELS)
 
 
 def command(out, *extra):
@@ -68,7 +69,8 @@ def test_no_prediction_existed_before_its_label(session):
     entries = read_journal(SessionFolder.open(out).journal_path)
     labelled = {e.event.trial_id: e.seq for e in entries if isinstance(e.event, Labelled)}
     scores = [e for e in entries if isinstance(e.event, Scored)]
-    assert len(scores) == len(labelled) * len(MODELS)
+    assert {e.event.model for e in scores} == MODELS
+    assert len(scores) >= len(labelled) * len(MODELS)
     assert all(labelled[e.event.trial_id] < e.seq for e in scores)
 
 
@@ -108,6 +110,20 @@ def test_status_tells_the_same_as_the_journal(session, capsys):
     status = json.loads(capsys.readouterr().out)
     assert status["planned"] == status["labelled"] == status["done"]
     assert status["disk_left"] > 0
+
+
+def test_scoring_again_adds_events_and_changes_no_label(session, capsys):
+    out, _ = session
+    before = SessionFolder.open(out).read_state()
+    assert main(["score", str(out), "--models", "point", "--json"]) == 0
+    told = json.loads(capsys.readouterr().out)
+    assert told["scored_takes"] == {str(out): len(before.order)}
+    after = SessionFolder.open(out).read_state()
+    assert after.seq == before.seq + len(before.order)
+    assert [t.label for t in after.order] == [t.label for t in before.order]
+    assert main(["score", str(out), "--models", "pointy"]) == 2
+    assert "pointy" in capsys.readouterr().err
+    assert SessionFolder.open(out).read_state().seq == after.seq
 
 
 def test_resuming_a_finished_session_changes_no_trial(session):
