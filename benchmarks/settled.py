@@ -30,10 +30,12 @@ from reach.models.base import check_batch
 from reach.models.registry import make_scorer
 from reach.models.settled import Settled, SettledContact
 from reach.models.settled_grade import Grade, quantities
+from reach.models.settled_score import settled_robust
 from reach.models.settled_verdict import FATES
 from reach.world.rollouts import Outcome
 
 BINS = np.linspace(0.0, 1.0, 11)
+SCORE_SEED = 1
 
 
 def settled_trials(trials: Trials, model: SettledContact) -> Settled:
@@ -84,51 +86,37 @@ def _agreement(row: np.ndarray) -> dict[str, float]:
     }
 
 
-def fit_grade(all_trials: list[Trials], told: list[Settled]) -> Grade:
-    """Maximum likelihood of the trials' outcomes, every part counting the same."""
-    names = [trials.object_name for trials in all_trials]
-    x, y, w = [], [], []
-    for trials, settled in zip(all_trials, told, strict=True):
-        x.append(quantities(YUMI, settled)[trials.valid])
-        y.append((trials.outcome == Outcome.HELD)[trials.valid])
-        w.append(np.full(len(y[-1]), 1.0 / names.count(trials.object_name)))
-    X, Y, W = np.concatenate(x), np.concatenate(y).astype(float), np.concatenate(w)
+def fit_grade(cases: list[GraspCase], samples: list[Settled]) -> Grade:
+    """Maximum likelihood of the grasps' success rates, every part counting the same."""
+    names = [case.object_name for case in cases]
+    X = np.array([quantities(YUMI, settled) for settled in samples])
+    Y = np.array([case.rate for case in cases])
+    W = np.array([1.0 / names.count(name) for name in names])
 
     def loss(b: np.ndarray) -> float:
         z = X @ b
-        return float(np.average(np.logaddexp(0.0, z) - Y * z, weights=W))
+        return float(np.average(np.logaddexp(0.0, z) - Y * z, weights=W) + 1e-4 * b @ b)
 
-    held, area, inside, preload, failed = minimize(loss, np.zeros(X.shape[1])).x
-    return Grade(*(round(float(v), 2) for v in (held, area, inside, -preload, failed)))
-
-
-def brier(all_trials: list[Trials], told: list[Settled], grade: Grade | None) -> float:
-    """Mean squared error of a sample's chance, averaged over parts."""
-    errors: dict[str, list[np.ndarray]] = {}
-    for trials, settled in zip(all_trials, told, strict=True):
-        chance = grade.chances(YUMI, settled) if grade else (settled.margin >= 1.0).astype(float)
-        error = (chance - (trials.outcome == Outcome.HELD))[trials.valid] ** 2
-        errors.setdefault(trials.object_name, []).append(error)
-    return float(np.mean([np.concatenate(each).mean() for each in errors.values()]))
+    return Grade(*np.round(minimize(loss, np.zeros(X.shape[1])).x, 2))
 
 
-def cross_fitted(all_trials: list[Trials], told: list[Settled]) -> dict[str, Any]:
-    """Grades fitted without half of the parts, and their error on that half."""
-    names = list(dict.fromkeys(trials.object_name for trials in all_trials))
-    result: dict[str, Any] = {}
+def cross_fitted(cases: list[GraspCase], samples: list[Settled]) -> dict[str, Any]:
+    """Scores of each half of the parts by a grade fitted on the other half."""
+    names = list(dict.fromkeys(case.object_name for case in cases))
+    scores, fitted = np.zeros(len(cases)), {}
     for half in (0, 1):
-        left_out = set(names[half::2])
-        fit, judge = [], []
-        for pair in zip(all_trials, told, strict=True):
-            (judge if pair[0].object_name in left_out else fit).append(pair)
-        grade = fit_grade(*map(list, zip(*fit, strict=True)))  # type: ignore[arg-type]
-        judged = list(map(list, zip(*judge, strict=True)))
-        result[f"without half {half}"] = {
-            "grade": grade.version,
-            "brier": brier(*judged, grade),  # type: ignore[arg-type]
-            "brier of plain verdicts": brier(*judged, None),  # type: ignore[arg-type]
-        }
-    return result
+        left_out = {*names[half::2]}
+        inside = [i for i, case in enumerate(cases) if case.object_name not in left_out]
+        grade = fit_grade([cases[i] for i in inside], [samples[i] for i in inside])
+        fitted[f"without half {half}"] = grade.version
+        for i, case in enumerate(cases):
+            if case.object_name in left_out:
+                scores[i] = grade.chance(YUMI, samples[i])
+    return {
+        **fitted,
+        "metrics": mean_metrics(Outcomes.of(cases), scores),
+        "reliability diagram": reliability_diagram(cases, scores),
+    }
 
 
 def cases_of(all_trials: list[Trials]) -> list[GraspCase]:
@@ -180,12 +168,11 @@ def main() -> None:
     told = [settled_trials(trials, model) for trials in all_trials]
     cost = (time.process_time() - start) / (arguments.samples * len(all_trials))
     cases = cases_of(all_trials)
-    scorers = [make_scorer(name) for name in ("settled-robust", "reach-robust", "reach")]
-    table = compare(cases, scorers, pose_error=ERROR, seed=1, use_cache=False)
-    plain = make_scorer("settled-robust", graded=False)
-    shares = np.array(
-        [plain.score(c.scene, c.grasp, pose_error=ERROR, seed=1).value for c in cases]
-    )
+    scorers = [make_scorer(name) for name in ("settled-robust", "reach-robust", "settled", "reach")]
+    table = compare(cases, scorers, pose_error=ERROR, seed=SCORE_SEED, use_cache=False)
+    robust = settled_robust()
+    samples = [robust.settled_samples(c.scene, c.grasp, ERROR, SCORE_SEED) for c in cases]
+    shares = np.array([(settled.margin >= 1.0).mean() for settled in samples])
     graded = table.row("settled-robust").scores
     results = {
         "grasps": len(cases),
@@ -194,12 +181,13 @@ def main() -> None:
         "started inside part or table": int(sum((~t.valid).sum() for t in all_trials)),
         "CPU ms a verdict": 1e3 * cost,
         "agreement": agreement(all_trials, told),
-        "grade fitted on all": fit_grade(all_trials, told).version,
-        "grade": cross_fitted(all_trials, told),
+        "grade fitted on all": fit_grade(cases, samples).version,
+        "grade fitted on the other half": cross_fitted(cases, samples),
         "table": {row.name: row.mean for row in table.rows},
         "above overlap": {row.name: row.above_overlap for row in table.rows if row.above_overlap},
         "settled-robust, plain share": mean_metrics(Outcomes.of(cases), shares),
         "reliability diagram": reliability_diagram(cases, graded),
+        "seconds a grasp": {row.name: row.seconds_per_grasp for row in table.rows},
         "worst": worst(cases, graded),
     }
     text = json.dumps(results, indent=1)

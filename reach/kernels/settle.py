@@ -443,7 +443,7 @@ def opposed(seen: FloatArray, points: int, room: Room) -> float:
         size += value * value
         for i in range(6):
             d[i] -= seen[m, i] * value
-    size = np.sqrt(size)
+    size = float(np.sqrt(size))
     if size < 1e-9:
         return 0.0
     for i in range(6):

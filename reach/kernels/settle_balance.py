@@ -61,7 +61,7 @@ def residual(
                 x[m] += convex[k] * hull[k, m]
             length += x[m] * x[m]
             result[m] = x[m]
-        length = np.sqrt(length)
+        length = float(np.sqrt(length))
         if length <= balanced:
             return length
         for i in range(6):

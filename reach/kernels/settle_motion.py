@@ -28,7 +28,8 @@ def closing_axis(T_gripper_pad: FloatArray) -> tuple[FloatArray, bool]:
 
 @compiled
 def _unit(v: FloatArray) -> FloatArray:
-    return v / np.sqrt(v[0] * v[0] + v[1] * v[1] + v[2] * v[2])
+    unit: FloatArray = v / np.sqrt(v[0] * v[0] + v[1] * v[1] + v[2] * v[2])
+    return unit
 
 
 @compiled

@@ -1,10 +1,10 @@
-"""From a verdict to a chance: how firmly a settled part is held.
+"""From verdicts to a chance: how often, and how firmly, a settled part is held.
 
-A mean of yes and no loses what a hold is worth: a part held at the rim of a pad, by a sliver of
-surface, or with friction nearly used up is lost more often than one held in the middle. The
-chance that a sample succeeds is a logistic function of three quantities with a meaning, rising
-with each; a sample that fails has one chance of its own. The five numbers are fitted, see
-docs/decisions/0091.
+The mean of yes and no loses what a hold is worth: a part held at the rim of a pad, or by a sliver
+of surface, is lost more often than one held in the middle. The chance is a logistic function of
+two quantities with a meaning, and rises with both: the share of samples that hold, and how far
+inside the pads' outline the held part is pressed. The three numbers are fitted on simulated
+trials; what else was tried is in docs/decisions/0091.
 """
 
 from __future__ import annotations
@@ -19,59 +19,48 @@ from reach.models.settled import Settled
 
 DEEP_INSIDE = 0.5
 """Pressure this far from the outline, in parts of half the pad's width, is as good as any."""
-MOST_PRELOAD = 1.5
 
 
 @dataclass(frozen=True, slots=True)
 class Grade:
-    """A logistic chance of success of one settled sample, in log odds.
+    """A logistic chance of success; log odds by quantity.
 
     Args:
-        held: of a sample that holds with nothing in its favor.
-        area: added times the root of the pad's share that the part covers, of the lesser jaw.
-        inside: added times the distance of the pressure from the pad's outline, in parts of half
-            the pad's width, up to one half, of the lesser jaw.
-        preload: taken off times the share of friction that the preload uses up.
-        failed: of a sample that fails.
+        offset: of a grasp with nothing in its favor.
+        share: for each unit of the log odds of a sample to hold.
+        inside: for pressure half the pad's width from the outline.
     """
 
-    held: float
-    area: float
+    offset: float
+    share: float
     inside: float
-    preload: float
-    failed: float
 
     @property
     def version(self) -> str:
         """The numbers, for the record."""
-        numbers = (self.held, self.area, self.inside, self.preload, self.failed)
-        return " ".join(f"{number:g}" for number in numbers)
+        return " ".join(f"{n:g}" for n in (self.offset, self.share, self.inside))
 
-    def chances(self, gripper: ParallelJawGripper, told: Settled) -> FloatArray:
-        """Chance of each sample, shape (N,)."""
-        weights = np.array([self.held, self.area, self.inside, -self.preload, self.failed])
-        chance: FloatArray = 1.0 / (1.0 + np.exp(-quantities(gripper, told) @ weights))
-        return chance
+    def chance(self, gripper: ParallelJawGripper, told: Settled) -> float:
+        """Chance of a grasp, in [0, 1], from its settled samples."""
+        weights = np.array([self.offset, self.share, self.inside])
+        return float(1.0 / (1.0 + np.exp(-quantities(gripper, told) @ weights)))
 
 
 def quantities(gripper: ParallelJawGripper, told: Settled) -> FloatArray:
-    """What the log odds are linear in, shape (N, 5).
+    """What the log odds are linear in, shape (3,): 1, log odds to hold, and distance inside.
 
-    Columns: held or not, root of the covered share, distance to the outline, share of friction
-    used by the preload (all zero unless held), and failed or not.
+    A share of k of n counts as (k + 1/2) / (n + 1). The distance of the center of pressure from
+    the pad's outline, of the lesser jaw and in parts of half the pad's width, is a mean over the
+    samples that hold, zero if none does.
     """
-    pads = [jaw.pad for jaw in gripper.jaws]
     held = told.margin >= 1.0
-    preload, area, inside = told.features[:, 3], told.features[:, 4], told.features[:, 5]
-    share = np.clip(area / min(pad.area for pad in pads), 0.0, 1.0)
-    depth = np.clip(inside / (0.5 * min(pad.width for pad in pads)), 0.0, DEEP_INSIDE)
-    columns = [
-        np.ones(len(held)),
-        np.sqrt(share),
-        depth,
-        np.clip(preload, 0.0, MOST_PRELOAD),
-    ]
-    return np.column_stack([*(held * column for column in columns), ~held])
+    count = int(held.sum())
+    log_odds = float(np.log((count + 0.5) / (len(held) - count + 0.5)))
+    if not count:
+        return np.array([1.0, log_odds, 0.0])
+    half_width = 0.5 * min(jaw.pad.width for jaw in gripper.jaws)
+    inside = np.clip(told.features[held, 5] / half_width, 0.0, DEEP_INSIDE)
+    return np.array([1.0, log_odds, inside.mean()])
 
 
-GRADE = Grade(held=-1.7, area=3.9, inside=9.6, preload=1.1, failed=-1.54)
+GRADE = Grade(offset=-1.17, share=0.71, inside=4.66)

@@ -102,12 +102,12 @@ def _details(verdict: SettledVerdict) -> dict[str, Any]:
 
 @dataclass(frozen=True, slots=True)
 class SettledRobustScorer(_ManyScores):
-    """Scores the mean chance of holding under perturbed pose, friction and mass.
+    """Scores the chance of holding under perturbed pose, friction and mass.
 
     Args:
         model: judges each sample.
         default_pose_error: used where a scene's own is not known.
-        grade: turns what is known of a sample into its chance; None counts plain verdicts.
+        grade: turns what is known of all samples into a chance; None takes the share that holds.
         samples: settled grasps a score.
         friction_spread: relative standard deviation.
         mass_spread: relative standard deviation.
@@ -151,13 +151,12 @@ class SettledRobustScorer(_ManyScores):
         error = pose_error or self.default_pose_error
         told = self.settled_samples(scene, grasp, error, seed)
         held = told.margin >= 1.0
-        chance = (
-            held.astype(float) if self.grade is None else self.grade.chances(scene.gripper, told)
-        )
+        share = float(held.mean())
+        value = share if self.grade is None else self.grade.chance(scene.gripper, told)
         low, high = wilson_interval(int(held.sum()), len(held))
         counts = Counter(str(FATES[code]) for code in told.fate)
         details: dict[str, Any] = {
-            "share": float(held.mean()),
+            "share": share,
             "low": low,
             "high": high,
             "samples": len(held),
@@ -168,7 +167,7 @@ class SettledRobustScorer(_ManyScores):
             "pose_translation": error.translation_deviation,
             "pose_rotation": error.rotation_deviation,
         }
-        return Score(float(chance.mean()), time.perf_counter() - start, details)
+        return Score(value, time.perf_counter() - start, details)
 
     def settled_samples(
         self, scene: Scene, grasp: Grasp, pose_error: PoseError, seed: int

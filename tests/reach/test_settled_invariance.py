@@ -12,6 +12,7 @@ from reach.errors import InvalidInputError
 from reach.gripper import Jaw
 from reach.kernels.settle_press import press, pressed
 from reach.models.registry import make_scorer
+from reach.models.settled import Settled
 from reach.models.settled_grade import GRADE
 from reach.models.settled_score import SettledRobustScorer, SettledScorer
 from reach.models.settled_verdict import Fate
@@ -168,11 +169,21 @@ def test_robust_score_is_graded_reproducible_and_rises_with_a_better_hold():
     assert plain.parameters["grade"] == "none" != scorer.parameters["grade"]
 
 
-def test_the_grade_is_monotone_in_what_it_is_made_of():
-    assert min(GRADE.area, GRADE.inside, GRADE.preload) >= 0
-    least_held = GRADE.held - GRADE.preload * 1.5
-    assert least_held <= GRADE.held + GRADE.area + 0.5 * GRADE.inside
-    assert GRADE.failed < GRADE.held + GRADE.area + 0.5 * GRADE.inside - GRADE.preload
+def told(held, inside):
+    """Settled samples of which some hold, all pressed at one distance inside the outline [m]."""
+    count = len(held)
+    features = np.zeros((count, 9))
+    features[:, 5] = inside
+    nothing = np.zeros(count, np.int64)
+    margin = np.where(held, 10.0, 0.0)
+    return Settled(margin, nothing, nothing, np.ones((count, 2)), features, np.empty((0, 4, 4)), 0)
+
+
+def test_the_grade_rises_with_the_share_that_holds_and_with_the_distance_from_the_rim():
+    share = [GRADE.chance(YUMI, told(np.arange(100) < k, 0.003)) for k in range(0, 101, 5)]
+    assert np.all(np.diff(share) > 0) and share[0] < 0.05 and share[-1] > 0.95
+    rim = [GRADE.chance(YUMI, told(np.arange(100) < 60, d)) for d in np.linspace(-1e-3, 5e-3, 20)]
+    assert np.all(np.diff(rim) >= 0) and rim[-1] > rim[0] + 0.2
 
 
 @pytest.mark.parametrize(
