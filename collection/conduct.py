@@ -167,7 +167,6 @@ def _run(
     asked: Conduct, folder: SessionFolder, setup: Setup, station: Station, terminal: Console
 ) -> None:
     from collection.annotator import TappedJournal
-    from collection.robots.motion import make_safe
     from labeling.controller import SessionController
     from logs.disk import trials_left
     from logs.recovery import recover_session
@@ -181,7 +180,7 @@ def _run(
     controller = SessionController(
         journal,
         state,
-        stop=lambda: make_safe(station.arm, station.gripper),
+        stop=lambda: _stop(station),
         trials_left=lambda: trials_left(folder.trials),
     )
     auto = setup.options.operator == "auto"
@@ -207,6 +206,17 @@ def _run(
     finally:
         controller.close(status, reason)
     _sum_up(asked, folder, terminal)
+
+
+def _stop(station: Station) -> None:
+    """Stop arm and hand, both whatever becomes of the other.
+
+    Raises:
+        RobotError: a stop did not reach its device; the operator must use the hardware stop.
+    """
+    with ExitStack() as stops:  # runs every one, and raises what went wrong
+        stops.callback(station.gripper.stop)
+        stops.callback(station.arm.stop)
 
 
 def _lead(

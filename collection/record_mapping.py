@@ -171,5 +171,5 @@ def _shape(shape: protocol.Shape) -> descriptions.Shape:
         size = (shape.size[0], *(2 * half for half in shape.size[1:]))
     rows = tuple(tuple(row) for row in shape.T_link_shape.tolist())
     return descriptions.Shape.model_validate(
-        {"type": shape.kind, "size": size, "T_link_shape": rows}
+        {"type": shape.kind, "size": size, "T_link_shape": rows, "rgba": shape.rgba}
     )

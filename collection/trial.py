@@ -234,14 +234,15 @@ def _quality(found: Registration) -> dict[str, Any]:
 
 def _ask(attempt: _Attempt, found: Registration, recorder: TrialRecorder) -> FloatArray:
     recorder.registration(mapping.registration_record(found, attempt.station.clock.now_ns()))
-    poses = [found.T_world_object, *(rival.T_world_object for rival in found.rivals)]
+    rivals = [rival for rival in found.rivals if not rival.ruled_out]
+    poses = [found.T_world_object, *(rival.T_world_object for rival in rivals)]
     chosen = attempt.take.confirm_pose(
         {
             "registration": _quality(found),
             "poses": [pose.tolist() for pose in poses],
             "rivals": [
                 {"render_cost": rival.render_cost, "stable_pose": rival.stable_pose}
-                for rival in found.rivals
+                for rival in rivals
             ],
         }
     )
