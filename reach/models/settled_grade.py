@@ -29,21 +29,24 @@ class Grade:
         offset: of a grasp with nothing in its favor.
         share: for each unit of the log odds of a sample to hold.
         inside: for pressure half the pad's width from the outline.
+        certain: a chance from here on counts as 1; the fit cannot tell it from certainty.
     """
 
     offset: float
     share: float
     inside: float
+    certain: float = 0.97
 
     @property
     def version(self) -> str:
         """The numbers, for the record."""
-        return " ".join(f"{n:g}" for n in (self.offset, self.share, self.inside))
+        return " ".join(f"{n:g}" for n in (self.offset, self.share, self.inside, self.certain))
 
     def chance(self, gripper: ParallelJawGripper, told: Settled) -> float:
         """Chance of a grasp, in [0, 1], from its settled samples."""
         weights = np.array([self.offset, self.share, self.inside])
-        return float(1.0 / (1.0 + np.exp(-quantities(gripper, told) @ weights)))
+        chance = float(1.0 / (1.0 + np.exp(-quantities(gripper, told) @ weights)))
+        return 1.0 if chance >= self.certain else chance
 
 
 def quantities(gripper: ParallelJawGripper, told: Settled) -> FloatArray:

@@ -181,7 +181,8 @@ def told(held, inside):
 
 def test_the_grade_rises_with_the_share_that_holds_and_with_the_distance_from_the_rim():
     share = [GRADE.chance(YUMI, told(np.arange(100) < k, 0.003)) for k in range(0, 101, 5)]
-    assert np.all(np.diff(share) > 0) and share[0] < 0.05 and share[-1] > 0.95
+    assert np.all(np.diff(share) >= 0) and np.all(np.diff(share[:18]) > 0)
+    assert share[0] < 0.05 and share[-1] == 1.0
     rim = [GRADE.chance(YUMI, told(np.arange(100) < 60, d)) for d in np.linspace(-1e-3, 5e-3, 20)]
     assert np.all(np.diff(rim) >= 0) and rim[-1] > rim[0] + 0.2
 
