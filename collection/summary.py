@@ -13,6 +13,8 @@ if TYPE_CHECKING:
 
     from logs.state import SessionState, TakeState
 
+ROBUST = "-robust"
+
 
 @dataclass(frozen=True, slots=True)
 class SummaryRow:
@@ -48,23 +50,33 @@ def summarize(state: SessionState) -> list[SummaryRow]:
 
 
 def summary_table(rows: Iterable[SummaryRow], *, simulated: bool) -> Table:
-    """The rows as a table for the terminal."""
+    """The rows as a table for the terminal, narrow enough for 80 columns."""
     from rich import box
     from rich.table import Table
 
     rows = list(rows)
-    models = list(dict.fromkeys(name for row in rows for name in row.predictions))
+    bases = list(dict.fromkeys(_base(name) for row in rows for name in row.predictions))
     title = "Simulated trials: labels and outcomes come from MuJoCo" if simulated else None
     table = Table(title=title, title_justify="left", box=box.SIMPLE_HEAD, padding=(0, 1))
-    table.add_column("object")
-    for heading in ("trials", "success", *(name.replace("-", "\n") for name in models)):
-        table.add_column(heading, justify="right")
+    table.caption = "percent lifted, and what each model predicted: nominal/robust"
+    table.add_column("object", no_wrap=True, max_width=22)
+    for heading in ("trials", "lifted", *bases):
+        table.add_column(heading, justify="right", no_wrap=True)
     for row in rows:
         if row.name == "all":
             table.add_section()
-        scores = [_share(row.predictions.get(model)) for model in models]
-        table.add_row(row.name, str(row.trials), _share(row.success_rate), *scores)
+        pairs = [_pair(row.predictions, base) for base in bases]
+        table.add_row(row.name, str(row.trials), _percent(row.success_rate), *pairs)
     return table
+
+
+def _base(model: str) -> str:
+    return model.removesuffix(ROBUST)
+
+
+def _pair(predictions: dict[str, float], base: str) -> str:
+    found = [predictions.get(base), predictions.get(base + ROBUST)]
+    return "/".join(_percent(value) for value in found)
 
 
 def _row(name: str, takes: list[TakeState]) -> SummaryRow:
@@ -82,5 +94,5 @@ def _row(name: str, takes: list[TakeState]) -> SummaryRow:
     )
 
 
-def _share(value: float | None) -> str:
-    return "-" if value is None else f"{100 * value:.0f} %"
+def _percent(value: float | None) -> str:
+    return "-" if value is None else f"{100 * value:.0f}"
