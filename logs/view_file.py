@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import shutil
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -12,6 +13,8 @@ from logs.errors import ViewError
 
 _END = b"RRF2FOOT"
 _END_SIZE = len(_END) + 4
+LEAST_ROOM = 64 * 2**20
+"""Bytes that must be free; a trial's view takes about two megabytes."""
 
 
 @contextmanager
@@ -38,6 +41,7 @@ def view_file(
     recording.set_log_time_enabled(False)
     recording.set_log_tick_enabled(False)
     try:
+        _require_room(out)
         try:
             recording.set_sinks(rr.FileSink(str(temporary)), default_blueprint=blueprint)
             yield recording
@@ -52,6 +56,17 @@ def view_file(
         raise ViewError(f"cannot write the view {out}: {error}") from error
     finally:
         temporary.unlink(missing_ok=True)
+
+
+def _require_room(out: Path) -> None:
+    """Refuse a nearly full disk before Rerun writes: once its writer fails, it may wait for ever.
+
+    Raises:
+        ViewError: less than LEAST_ROOM is free.
+    """
+    free = shutil.disk_usage(out.parent).free
+    if free < LEAST_ROOM:
+        raise ViewError(f"cannot write the view {out}: {free >> 20} MB left; is the disk full?")
 
 
 def _is_whole(path: Path) -> bool:
