@@ -34,7 +34,7 @@ class SessionOptions(BaseModel):
         mesh_unit: unit of the mesh files' numbers.
         models: whose predictions annotate each trial.
         min_probability: stable poses below it are not planned.
-        attempts: so many void takes in a row end a trial that nobody watches.
+        attempts: so many void takes in a row, and a trial that nobody watches is skipped.
     """
 
     model_config = ConfigDict(extra="forbid", frozen=True)

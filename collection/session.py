@@ -13,6 +13,8 @@ from typing import TYPE_CHECKING
 
 from collection.errors import CollectionError, DeviceError, PlacementError, Recovery
 from collection.trial import TrialContext, run_take
+from labeling.auto import ACTOR
+from labeling.commands import AnswerStatus, Command, CommandKind
 from labeling.errors import SessionEndingError, TakeEndedError
 from logs.events import Paused
 from logs.state import STATION_HOLD
@@ -27,10 +29,6 @@ if TYPE_CHECKING:
     from logs.state import TrialState
 
 
-class TooManyVoidsError(CollectionError):
-    """A trial was void so often in a row that a person has to look."""
-
-
 @dataclass(slots=True)
 class Session:
     """The loop over the planned trials.
@@ -40,7 +38,7 @@ class Session:
         controller: the session's writer.
         annotator: scores and draws what is done.
         folder_of: where a take's record goes, by trial id and take.
-        attempts: so many void takes of a trial in a row end an unattended session.
+        attempts: so many void takes of a trial in a row, and it is left to a person, or skipped.
         attended: a person watches; then the session holds instead of ending.
         say: tells the operator at the terminal.
     """
@@ -58,7 +56,6 @@ class Session:
 
         Raises:
             DeviceError: the station needs a person, and nobody is there.
-            TooManyVoidsError: a trial does not succeed in being tried, and nobody is there.
         """
         voids: Counter[str] = Counter()
         while (work := self.controller.next_work()) is not None:
@@ -73,7 +70,7 @@ class Session:
                 return
             except (RegistrationError, PlacementError, DeviceError) as error:
                 voids[work.trial_id] += 1
-                self._void(take, error, voids[work.trial_id])
+                self._void(work, take, error, voids[work.trial_id])
 
     def annotate_earlier(self) -> None:
         """Annotate what an earlier process labelled and did not live to annotate."""
@@ -96,7 +93,7 @@ class Session:
         if decision.kind == "label" and work.valid_take is not None:
             self.annotator.annotate(work.trial_id, work.valid_take)
 
-    def _void(self, take: Take, error: Exception, times: int) -> None:
+    def _void(self, work: TrialState, take: Take, error: Exception, times: int) -> None:
         """Give the take up; bring the station back, or wait for a person who can."""
         take.void(f"{type(error).__name__}: {error}")
         self._show_lights()
@@ -108,9 +105,21 @@ class Session:
         if recovery is Recovery.HALT:
             self._need_person(error)
         elif times >= self.attempts:
-            self._need_person(
-                TooManyVoidsError(f"void {times} times in a row, the last time because: {error}")
+            self._give_up(work, f"void {times} times in a row, the last time because: {error}")
+
+    def _give_up(self, work: TrialState, why: str) -> None:
+        """Leave a trial that cannot be tried: a person decides, or it is skipped and counted."""
+        if self.attended:
+            self._need_person(CollectionError(why))
+            return
+        with self.controller.reading():
+            skip = Command(
+                kind=CommandKind.SKIP, trial_id=work.trial_id, rev=work.rev, value={"text": why}
             )
+        answer = self.controller.submit(skip, ACTOR)
+        if answer.status is not AnswerStatus.STORED:
+            raise CollectionError(f"{why}; it could not be skipped: {answer.message}")
+        self.say(f"skipped: trial {work.planned.number}, {why}")
 
     def _show_lights(self) -> None:
         arm, camera = self.context.station.arm.state(), self.context.station.camera.state()

@@ -8,7 +8,7 @@ from contextlib import suppress
 import numpy as np
 
 from collection.clock import Clock
-from collection.errors import CollisionStopError, RobotError
+from collection.errors import CollisionStopError, GripperNotCalibratedError, RobotError
 from collection.robots.execution import (
     Execution,
     Phase,
@@ -133,10 +133,20 @@ def recover(arm: Arm, gripper: GripperDevice, settings: MotionSettings | None = 
         up = make_transform(None, (0, 0, RECOVERY_LIFT)) @ arm.pose()
         arm.move_to_pose(up, path=Path.LINEAR, speed=settings.careful())
     arm.clear_error()
-    if not gripper.state().calibrated:
-        gripper.calibrate()
-    gripper.open()
+    _open_calibrated(gripper)
     arm.home(speed=settings.transit())
+
+
+def _open_calibrated(gripper: GripperDevice) -> None:
+    """Open the hand; one that lost its zero is calibrated first, which needs free jaws."""
+    if gripper.state().calibrated:
+        try:
+            gripper.open()
+            return
+        except GripperNotCalibratedError:
+            pass  # it noticed only now
+    gripper.calibrate()
+    gripper.open()
 
 
 def _run(
