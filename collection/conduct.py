@@ -135,7 +135,7 @@ def _reopen(asked: Conduct) -> tuple[SessionFolder, Setup, Station]:
         if name not in ACCEPTABLE_CHANGES:
             raise UnknownNameError("change", name, ACCEPTABLE_CHANGES)
     planned = setup.options.model_dump()
-    for name in ("objects", "grasps", "repeats", "seed", "mesh_unit"):
+    for name in ("objects", "grasps", "repeats", "seed", "session", "mesh_unit"):
         if name in asked.given and asked.given[name] != planned[name]:
             raise OptionsError(
                 f"--{name.replace('_', '-')} {asked.given[name]!r} differs from the session's"

@@ -31,6 +31,7 @@ class SessionOptions(BaseModel):
         repeats: of each grasp.
         operator: a page, a terminal, or the simulated operator.
         seed: everything random follows from it.
+        session: 0, 1, ...: another number gives further grasps and trials of the same experiment.
         mesh_unit: unit of the mesh files' numbers.
         models: whose predictions annotate each trial.
         min_probability: stable poses below it are not planned.
@@ -45,6 +46,7 @@ class SessionOptions(BaseModel):
     repeats: Annotated[int, Field(ge=1)] = 5
     operator: OperatorKind = "auto"
     seed: int = 0
+    session: Annotated[int, Field(ge=0)] = 0
     mesh_unit: str = "m"
     models: tuple[str, ...] = DEFAULT_MODELS
     min_probability: Annotated[float, Field(ge=0, lt=1)] = 0.01

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 from collections.abc import Callable, Sequence
 from pathlib import Path
@@ -10,6 +11,8 @@ from typing import TYPE_CHECKING
 from reach.errors import InvalidInputError
 
 if TYPE_CHECKING:
+    from collection.coverage import Histogram
+    from logs.report.coverage import PlanCoverage
     from reach.evaluation.table import Evaluation
 
 REPORT_MODELS = (
@@ -70,8 +73,42 @@ def write_report(
             backend=backend,
             progress=progress,
         )
-    write_text(page, build_report(dataset, result, error, basis=stated["basis"], seed=seed))
+    text = build_report(
+        dataset, result, error, basis=stated["basis"], seed=seed, covered=_covered(sources)
+    )
+    write_text(page, text)
     return result
+
+
+def _covered(sources: Sequence[Path]) -> PlanCoverage | None:
+    """What the plans of these sessions cover; None where a source is no session."""
+    from collection.coverage import coverage
+    from collection.setup import read_setup
+    from logs.report.coverage import Bars, PlanCoverage
+    from logs.session import SESSION_NAME, SessionFolder
+    from reach.gripper import ParallelJawGripper
+
+    if not all((source / SESSION_NAME).exists() for source in sources):
+        return None
+    setups = [read_setup(SessionFolder.open(source)) for source in sources]
+    found = coverage(
+        [grasp for setup in setups for grasp in setup.plan.grasps],
+        {name: part for setup in setups for name, part in setup.objects.items()},
+        ParallelJawGripper.yumi(),
+    )
+
+    def bars(title: str, histogram: Histogram, scale: float) -> Bars:
+        return Bars(title, tuple(edge * scale for edge in histogram.edges), histogram.counts)
+
+    return PlanCoverage(
+        found.grasps,
+        (
+            bars("approach angle [deg]", found.approach_angle, 180.0 / math.pi),
+            bars("width [mm]", found.width, 1e3),
+            bars("jitter offset [mm]", found.offset, 1e3),
+        ),
+        {kind.value: count for kind, count in found.contacts.items()},
+    )
 
 
 def write_text(path: Path, text: str) -> None:

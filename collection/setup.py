@@ -105,6 +105,7 @@ def make_setup(options: SessionOptions, station: Station) -> Setup:
         grasps=options.grasps,
         repeats=options.repeats,
         seed=options.seed,
+        session=options.session,
         reachable=reach_of(station),
         min_probability=options.min_probability,
         options=SamplingOptions(batch=max(LEAST_BATCH, RAYS_PER_GRASP * options.grasps)),

@@ -23,6 +23,10 @@ def collect(
         str | None, typer.Option(help="Who labels: auto, web or terminal. [web]")
     ] = None,
     seed: Annotated[int | None, typer.Option(help="Everything random follows from it. [0]")] = None,
+    session: Annotated[
+        int | None,
+        typer.Option(help="0, 1, ...: further trials of the same experiment, other grasps. [0]"),
+    ] = None,
     mesh_unit: Annotated[
         str | None, typer.Option(help="Unit of mesh files: m, cm, mm or in. [m]")
     ] = None,
@@ -61,6 +65,7 @@ def collect(
         "repeats": repeats,
         "operator": operator,
         "seed": seed,
+        "session": session,
         "mesh_unit": mesh_unit,
     }
     given = {name: value for name, value in chosen.items() if value is not None}

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from logs.report import sections
+from logs.report.coverage import PlanCoverage, coverage_svg
 from logs.report.curves import precision_recall_svg, reliability_svg
 from logs.report.drift import drift_svg, measure_drift
 from logs.report.pressure import compare_pressure, pressure_svg
@@ -25,7 +26,13 @@ MAP_SIZE = (520, 420)
 
 
 def build_report(
-    dataset: Dataset, result: Evaluation, pose_error: PoseError, *, basis: str, seed: int = 0
+    dataset: Dataset,
+    result: Evaluation,
+    pose_error: PoseError,
+    *,
+    basis: str,
+    seed: int = 0,
+    covered: PlanCoverage | None = None,
 ) -> str:
     """Make the page.
 
@@ -35,6 +42,7 @@ def build_report(
         pose_error: that the robust scores were computed under.
         basis: where the pose error is from.
         seed: of the probe grasps.
+        covered: what the plan covers, where a plan is known.
 
     Returns:
         The HTML text; it holds all pictures and styles and loads nothing.
@@ -60,6 +68,8 @@ def build_report(
         pressure_picture=pressure_svg(pressure) if pressure else None,
         worst=sections.disagreements(result),
         station=sections.station(dataset),
+        covered=covered,
+        coverage_picture=coverage_svg(covered) if covered else None,
         drift=drift,
         drift_picture=drift_svg(drift) if drift else None,
         error={

@@ -126,6 +126,27 @@ def test_scoring_again_adds_events_and_changes_no_label(session, capsys):
     assert SessionFolder.open(out).read_state().seq == after.seq
 
 
+def test_the_report_shows_what_the_plan_covers(session, tmp_path, capsys):
+    out, _ = session
+    page = tmp_path / "report.html"
+    assert main(["report", str(out), "--out", str(page), "--models", "point", "--json"]) == 0
+    assert json.loads(capsys.readouterr().out)["report"] == str(page)
+    text = page.read_text()
+    assert f"{2 * GRASPS} planned grasps" in text
+    assert "jitter offset" in text
+    assert "Simulated: 4 of 4 trials" in text
+
+
+def test_a_further_session_plans_other_trials(session, capsys):
+    out, _ = session
+    words = ["collect", "--objects", OBJECTS, "--grasps", "2", "--repeats", "1", "--seed", "11"]
+    assert main([*words, "--session", "1", "--out", "unused", "--dry-run", "--json"]) == 0
+    further = {trial["trial_id"] for trial in json.loads(capsys.readouterr().out)["trials"]}
+    first = {trial["trial_id"] for trial in json.loads((out / "plan.json").read_text())["trials"]}
+    assert len(further) == len(first)
+    assert not further & first
+
+
 def test_resuming_a_finished_session_changes_no_trial(session):
     out, _ = session
     before = SessionFolder.open(out).read_state()
