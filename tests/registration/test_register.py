@@ -142,10 +142,11 @@ def test_calibration_error_moves_the_world_pose_only(parts, scenes, is_right):
 
 
 def test_real_meshes_are_found(scenes, is_right):
-    folder = Path(os.environ.get("REACH_DATA", "/nonexistent")) / "meshes"
+    beside = Path(__file__).resolve().parents[3] / "shared" / "data"
+    folder = Path(os.environ.get("REACH_DATA", beside)) / "meshes"
     meshes = sorted(folder.glob("*.obj"))
     if not meshes:
-        pytest.skip("no real meshes: set REACH_DATA to a folder that holds meshes/*.obj")
+        pytest.skip(f"no real meshes in {folder}: set REACH_DATA to a folder with meshes/*.obj")
     from reach import GraspObject
 
     for path in meshes:
