@@ -13,6 +13,7 @@ help: ## list the commands
 install: $(VENV)/.installed ## make the environment in .venv
 
 $(VENV)/.installed: pyproject.toml constraints.txt
+	@./tests/install-system-packages runtime
 	@test -x $(BIN)/python || $(PYTHON) -m venv $(VENV)
 	@$(BIN)/python -m pip install --quiet --disable-pip-version-check 'uv>=0.5'
 	@$(BIN)/uv pip install --quiet --python $(BIN)/python --constraint constraints.txt --editable '.[dev]'
