@@ -9,9 +9,9 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
+from logs.durable import sync_directory, write_durably
 from logs.events import Entry, JournalRepaired
 from logs.journal import JournalScan, encode_entry, scan_journal
-from logs.session import sync_directory
 
 
 @dataclass(frozen=True, slots=True)
@@ -87,9 +87,6 @@ def _keep_copy(path: Path) -> Path:
 
 def _replace(path: Path, content: bytes) -> None:
     temporary = path.with_name(f".{path.name}.repair")
-    with temporary.open("wb") as stream:
-        stream.write(content)
-        stream.flush()
-        os.fsync(stream.fileno())
+    write_durably(temporary, content)
     os.replace(temporary, path)
     sync_directory(path.parent)

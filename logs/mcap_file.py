@@ -17,9 +17,9 @@ from google.protobuf.message import Message
 from mcap.writer import CompressionType, Writer
 from mcap_protobuf.schema import build_file_descriptor_set
 
+from logs.durable import sync_directory
 from logs.errors import RecordWriteError
 from logs.records import FORMAT_VERSION, AttachmentRecord
-from logs.session import sync_directory
 
 PROFILE = "reach-trials"
 LIBRARY = f"reach-trials format {FORMAT_VERSION}"

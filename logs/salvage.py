@@ -14,10 +14,10 @@ from pathlib import Path
 from foxglove_schemas_protobuf.Log_pb2 import Log
 
 from logs import encode, topics
+from logs.durable import sync_directory
 from logs.mcap_file import PART_SUFFIX, DurableMcap
 from logs.mcap_walk import RawMessage, Walk, walk
 from logs.records import EventKind, ExitStatus, Severity, TrialEvent, TrialStop
-from logs.session import sync_directory
 from logs.topics import message_type
 from logs.trial_folder import PART_NAME, RECORD_NAME
 

@@ -17,15 +17,16 @@ from pathlib import Path
 
 from pydantic import BaseModel, ConfigDict, Field, JsonValue, ValidationError, model_validator
 
+from logs.durable import sync_directory, write_durably
 from logs.errors import NotASessionError, SessionChangedError, SessionExistsError
 from logs.events import Entry, SessionCreated, SessionOpened, Source
 from logs.journal import JOURNAL_NAME, Journal, encode_entry, read_journal
 from logs.lock import SessionLock
 from logs.state import PlannedEntry, SessionState
+from logs.trial_folder import TRIALS, take_folder
 
 SESSION_NAME = "session.json"
 PLAN_NAME = "plan.json"
-TRIALS_NAME = "trials"
 ACCEPTABLE_CHANGES = ("calibration", "camera", "robot")
 
 
@@ -139,13 +140,12 @@ class SessionFolder:
     @property
     def trials(self) -> Path:
         """Folder of the recorded trials."""
-        return self.path / TRIALS_NAME
+        return self.path / TRIALS
 
     def trial_folder(self, trial_id: str, take: int = 1) -> Path:
         """Where a take of a planned trial is recorded: `trials/0007_<uuid>[_take2]`."""
         number = next(t.number for t in self.descriptor.trials if t.trial_id == trial_id)
-        suffix = f"_take{take}" if take > 1 else ""
-        return self.trials / f"{number:04d}_{trial_id}{suffix}"
+        return take_folder(self.path, number, trial_id, take)
 
     def lock(self) -> SessionLock:
         """Become the one writer without opening the journal: for recovery."""
@@ -205,15 +205,6 @@ def open_segment(
     return entry
 
 
-def sync_directory(folder: Path) -> None:
-    """Put a folder's list of names on the disk."""
-    descriptor = os.open(folder, os.O_RDONLY | os.O_DIRECTORY)
-    try:
-        os.fsync(descriptor)
-    finally:
-        os.close(descriptor)
-
-
 def _fill(folder: Path, session: SessionDescriptor, files: Mapping[str, str | bytes]) -> None:
     first = Entry(
         seq=1, time_ns=session.created_ns, event=SessionCreated(session_id=session.session_id)
@@ -225,11 +216,8 @@ def _fill(folder: Path, session: SessionDescriptor, files: Mapping[str, str | by
     }
     for name, content in contents.items():
         (folder / name).parent.mkdir(exist_ok=True)
-        with (folder / name).open("wb") as stream:
-            stream.write(content.encode() if isinstance(content, str) else content)
-            stream.flush()
-            os.fsync(stream.fileno())
-    (folder / TRIALS_NAME).mkdir()
+        write_durably(folder / name, content)
+    (folder / TRIALS).mkdir()
     sync_directory(folder)
 
 

@@ -12,7 +12,6 @@ Names are for people and for sorting: programs trust the ids inside the record.
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator
 from pathlib import Path
 
 TRIALS = "trials"
@@ -25,7 +24,7 @@ _FOLDER = re.compile(r"(\d{4,})_(.+?)(?:_take(\d+))?")
 
 
 def take_folder(session: Path, number: int, trial_id: str, take: int = 1) -> Path:
-    """Folder of a take; not created here."""
+    """Folder of a take, `trials/0007_<trial id>[_take2]`; not created here."""
     suffix = "" if take == 1 else f"_take{take}"
     return session / TRIALS / f"{number:04d}_{trial_id}{suffix}"
 
@@ -67,11 +66,3 @@ def next_annotation_number(folder: Path) -> int:
     """The number after the newest annotation's, finished or not."""
     names = (path.name.removesuffix(".part") for path in folder.iterdir())
     return max((int(m[1]) for name in names if (m := _ANNOTATION.fullmatch(name))), default=0) + 1
-
-
-def parts(session: Path) -> Iterator[Path]:
-    """Unfinished records of a session."""
-    for folder in take_folders(session):
-        part = folder / PART_NAME
-        if part.exists():
-            yield part
