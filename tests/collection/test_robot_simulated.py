@@ -16,6 +16,7 @@ from collection.errors import (
     JointLimitError,
     NotConnectedError,
     Recovery,
+    RobotTimeoutError,
     StoppedError,
 )
 from collection.faults import Fault, FaultKind
@@ -200,3 +201,19 @@ def test_a_scripted_slip_drops_the_part(station: Station) -> None:
     assert station.simulation is not None
     assert not station.simulation.verdict().lifted
     assert not execution.sensor_verdict.lifted  # type: ignore[attr-defined]
+
+
+@pytest.mark.parametrize(("force", "grips"), [(19.0, True), (0.1, False)])
+def test_a_creeping_part_ends_the_closing_and_a_jammed_hand_does_not(
+    station: Station, monkeypatch: pytest.MonkeyPatch, force: float, grips: bool
+) -> None:
+    simulation = station.simulation
+    assert simulation is not None
+    monkeypatch.setattr(type(simulation), "jaw_speed", property(lambda _: 1e-3))
+    monkeypatch.setattr(type(simulation), "grip_force", property(lambda _: force))
+    if grips:
+        motion = station.gripper.close(20.0)
+        assert (motion.end_ns - motion.start_ns) * 1e-9 == pytest.approx(2.0, abs=0.2)
+    else:
+        with pytest.raises(RobotTimeoutError, match="did not come to rest"):
+            station.gripper.close(20.0)
