@@ -6,6 +6,7 @@ import importlib
 import re
 import sys
 from collections.abc import Sequence
+from typing import Annotated
 
 import typer
 
@@ -43,6 +44,7 @@ def build_app() -> typer.Typer:
         rich_markup_mode="markdown",
         pretty_exceptions_enable=False,
     )
+    app.callback()(_options_of_reach)
     for name, module_name in COMMANDS.items():
         module = importlib.import_module(f"collection.cli.{module_name}")
         member = getattr(module, module_name)
@@ -51,6 +53,35 @@ def build_app() -> typer.Typer:
         else:
             app.command(name)(member)
     return app
+
+
+def _options_of_reach(
+    version: Annotated[
+        bool,
+        typer.Option(
+            "--version",
+            is_eager=True,
+            callback=lambda given: _print_version(asked=given),
+            help="Print the version, and nothing else.",
+        ),
+    ] = False,
+) -> None:
+    """Take the options before the command; all act by their callbacks."""
+
+
+def _print_version(*, asked: bool) -> None:
+    if not asked:
+        return
+    print(_version())
+    raise typer.Exit
+
+
+def _version() -> str:
+    from collection.versions import git_commit, package_versions
+
+    commit = git_commit()
+    release = f"reach-trials {package_versions()['reach-trials']}"
+    return release if commit is None else f"{release} ({commit})"
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -83,6 +114,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 def _naming_the_value(message: str, arguments: Sequence[str]) -> str:
     """Add what was typed: the parser's own message names the option only."""
+    if message.startswith("No such command"):
+        return f"{message.rstrip('.')}; the commands are {', '.join(COMMANDS)}"
     option = re.match(r"Invalid value for '(?:-\w', '|-\w / )?(--[\w-]+)'", message)
     if option is None:
         return message

@@ -3,6 +3,7 @@
 import os
 import subprocess
 import sys
+from importlib import metadata
 from pathlib import Path
 
 import pytest
@@ -83,7 +84,9 @@ def test_no_session_there(capsys, tmp_path, command):
 
 
 def test_unknown_commands_and_options(capsys):
-    assert "fly" in refused(capsys, "fly")
+    line = refused(capsys, "fly")
+    assert "fly" in line
+    assert all(name in line for name in COMMANDS)
     assert "--wings" in refused(capsys, "status", "--wings")
 
 
@@ -91,6 +94,11 @@ def test_help_names_every_command(capsys):
     assert main(["--help"]) == 0
     told = capsys.readouterr().out
     assert all(name in told for name in COMMANDS)
+
+
+def test_version_is_printed(capsys):
+    assert main(["--version"]) == 0
+    assert capsys.readouterr().out.startswith(f"reach-trials {metadata.version('reach-trials')}")
 
 
 @pytest.mark.parametrize("arguments", [["--help"], ["status", "--help"]])
