@@ -14,42 +14,19 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Self
 
-from logs.events import AnyEvent, Entry, Scored
+from logs.events import Entry, Scored
 from logs.mirror import AnnotationMirror
 
 if TYPE_CHECKING:
     from collection.scoring import Prediction
     from labeling.controller import SessionController
-    from logs.journal import Journal
+    from logs.mirrored_journal import MirroredJournal
     from logs.session import SessionFolder
     from logs.state import TakeState
     from reach.pose_error import PoseError
 
 BACKLOG = 12
 """Takes that may wait for their scores before the session waits for them."""
-
-
-class TappedJournal:
-    """A journal whose new entries can be taken up later, off the operator's path.
-
-    Args:
-        journal: where events are stored.
-    """
-
-    def __init__(self, journal: Journal) -> None:
-        self._journal = journal
-        self.earlier = journal.entries
-        self.fresh: deque[Entry] = deque()
-
-    def append(self, event: AnyEvent) -> Entry:
-        """Store an event."""
-        entry = self._journal.append(event)
-        self.fresh.append(entry)
-        return entry
-
-    def close(self) -> None:
-        """Take no more events."""
-        self._journal.close()
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -75,14 +52,13 @@ class Annotator:
         self,
         session: SessionFolder,
         controller: SessionController,
-        journal: TappedJournal,
+        journal: MirroredJournal,
         models: Sequence[str],
         pose_error: PoseError,
     ) -> None:
         self._session = session
         self._controller = controller
         self._journal = journal
-        self._mirror = AnnotationMirror(session, journal.earlier)
         self._models = tuple(models)
         self._pose_error = pose_error
         self._pool = ProcessPoolExecutor(1, multiprocessing.get_context("forkserver"))
@@ -104,7 +80,6 @@ class Annotator:
     def annotate(self, trial_id: str, take: TakeState) -> None:
         """Annotate a labelled take soon: the scores it lacks, then its view."""
         assert take.record is not None
-        self._mirror_fresh()
         folder = (self._session.path / take.record).parent
         missing = [name for name in self._models if name not in take.scores]
         job = self._pool.submit(_score, folder, missing, self._pose_error)
@@ -117,7 +92,6 @@ class Annotator:
         """Store the predictions that are ready."""
         while self._waiting and self._waiting[0].predictions.done():
             self._store(self._waiting.popleft())
-        self._mirror_fresh()
         done = [view for view in self._views if view.done()]
         self._views = [view for view in self._views if view not in done]
         for view in done:
@@ -129,27 +103,18 @@ class Annotator:
             if progress is not None:
                 progress(len(self._waiting))
             self._store(self._waiting.popleft())
-        self._mirror_fresh()
         for view in self._views:
             view.result()
         self._views.clear()
 
     def _store(self, waiting: _Waiting) -> None:
         for prediction in waiting.predictions.result():
-            self._mirror_fresh()
             entry = self._controller.record(
                 scored_event(waiting.trial_id, waiting.take, prediction)
             )
-            self._mirror_fresh(but=entry.seq)
-            mirror_score(self._mirror, entry, prediction)
+            mirror_score(self._journal.mirror, entry, prediction)
+        self._journal.wait_mirrored()  # the view shows the label, too
         self._views.append(self._pool.submit(_derive_view, waiting.folder))
-
-    def _mirror_fresh(self, but: int | None = None) -> None:
-        """Mirror new labels and withdrawals; the entry `but` is mirrored by the caller."""
-        while self._journal.fresh:
-            entry = self._journal.fresh.popleft()
-            if entry.seq != but:
-                self._mirror.note(entry)
 
 
 def scored_event(trial_id: str, take: int, prediction: Prediction) -> Scored:

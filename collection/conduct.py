@@ -30,9 +30,9 @@ from logs.state import SessionState
 from reach.errors import ReachError, UnknownNameError
 
 if TYPE_CHECKING:
-    from collection.annotator import TappedJournal
     from collection.station import Station
     from labeling.controller import SessionController
+    from logs.mirrored_journal import MirroredJournal
 
 DEFAULTS: Mapping[str, Any] = {"operator": "web"}
 
@@ -166,9 +166,10 @@ def _check_operator(options: SessionOptions, station: Station) -> None:
 def _run(
     asked: Conduct, folder: SessionFolder, setup: Setup, station: Station, terminal: Console
 ) -> None:
-    from collection.annotator import TappedJournal
     from labeling.controller import SessionController
     from logs.disk import trials_left
+    from logs.mirror import AnnotationMirror
+    from logs.mirrored_journal import MirroredJournal
     from logs.recovery import recover_session
 
     if asked.resume:
@@ -176,7 +177,7 @@ def _run(
             terminal.print(f"{finding.place}: {finding.text}", markup=False)
     stored = folder.open_journal()
     state = SessionState.fold(folder.descriptor.trials, stored.entries)
-    journal = TappedJournal(stored)
+    journal = MirroredJournal(stored, AnnotationMirror(folder, stored.entries))
     controller = SessionController(
         journal,
         state,
@@ -224,7 +225,7 @@ def _lead(
     setup: Setup,
     station: Station,
     controller: SessionController,
-    journal: TappedJournal,
+    journal: MirroredJournal,
     terminal: Console,
 ) -> None:
     """Bring loop, operator, annotator and progress together, until the session ends."""

@@ -3,42 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager
 from pathlib import Path
 
 from labeling.commands import Actor
 from labeling.console import Console
 from labeling.controller import SessionController
 from logs.errors import LogError
-from logs.events import AnyEvent, Entry
-from logs.journal import Journal
 from logs.mirror import AnnotationMirror
+from logs.mirrored_journal import MirroredJournal
 from logs.session import SessionFolder
 from logs.state import SessionState, TrialState
-
-
-class MirroredJournal:
-    """A journal whose labels also appear as annotation files beside the records.
-
-    Args:
-        journal: the truth.
-        mirror: writes the files; what it cannot write now, recovery writes later.
-    """
-
-    def __init__(self, journal: Journal, mirror: AnnotationMirror) -> None:
-        self._journal = journal
-        self._mirror = mirror
-
-    def append(self, event: AnyEvent) -> Entry:
-        """Store an event, then mirror it."""
-        entry = self._journal.append(event)
-        with suppress(LogError):
-            self._mirror.note(entry)
-        return entry
-
-    def close(self) -> None:
-        """Take no more events."""
-        self._journal.close()
 
 
 @contextmanager
