@@ -1,31 +1,22 @@
-"""The few messages of a record that a data set needs, without reading its images.
-
-A finished record's summary says which chunks hold which channel; only those are read, and
-their checksums verified. A record without a summary is read whole.
-"""
+"""What a data set takes from records, without reading their images."""
 
 from __future__ import annotations
 
 import hashlib
-import io
 import os
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
 
-from logs import topics
-from logs.decode_v1 import decode_descriptor, decode_execution, decode_registration
 from logs.descriptions import GRIPPER_DESCRIPTION, read_gripper
 from logs.errors import RecordReadError
 from logs.mesh_attachment import OBJECT_MESH, read_mesh
-from logs.records import FORMAT_VERSION, ExecutionRecord, RegistrationRecord, TrialDescriptor
-from logs.schema import trial_v1_pb2 as v1
+from logs.record_outline import read_outline
+from logs.records import ExecutionRecord, RegistrationRecord, TrialDescriptor
 from logs.trial_record import read_record
 from reach.arrays import FloatArray, IntArray
 from reach.gripper import ParallelJawGripper
-
-_WANTED = (topics.START, topics.DESCRIPTOR, topics.REGISTRATION, topics.EXECUTION)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -76,39 +67,9 @@ def read_facts(paths: Sequence[Path]) -> list[RecordFacts]:
 
 def _facts(path: Path) -> RecordFacts:
     try:
-        data = path.read_bytes()
+        with path.open("rb") as stream:
+            digest = hashlib.file_digest(stream, "sha256").hexdigest()
     except OSError as error:
         raise RecordReadError(f"cannot read a trial's record: {error}") from error
-    digest = hashlib.sha256(data).hexdigest()
-    found = _by_summary(data)
-    if found is None:
-        record = read_record(path, images=False)
-        return RecordFacts(path, digest, record.descriptor, record.registration, record.execution)
-    registrations, executions = found[topics.REGISTRATION], found[topics.EXECUTION]
-    return RecordFacts(
-        path,
-        digest,
-        decode_descriptor(found[topics.START][0], found[topics.DESCRIPTOR][0]),
-        decode_registration(registrations[-1]) if registrations else None,
-        decode_execution(executions[-1]) if executions else None,
-    )
-
-
-def _by_summary(data: bytes) -> dict[str, list[bytes]] | None:
-    """Wanted messages by channel, or None if the file must be read whole."""
-    from mcap.exceptions import McapError
-    from mcap.reader import SeekingReader
-
-    found: dict[str, list[bytes]] = {topic: [] for topic in _WANTED}
-    try:
-        reader = SeekingReader(io.BytesIO(data), validate_crcs=True)
-        if reader.get_summary() is None:
-            return None
-        for _, channel, message in reader.iter_messages(topics=_WANTED, log_time_order=False):
-            found[channel.topic].append(message.data)
-    except (McapError, ValueError, EOFError):
-        return None
-    if not found[topics.START] or not found[topics.DESCRIPTOR]:
-        return None
-    version = v1.TrialStart.FromString(found[topics.START][0]).format_version
-    return found if version == FORMAT_VERSION else None
+    record = read_outline(path)
+    return RecordFacts(path, digest, record.descriptor, record.registration, record.execution)

@@ -55,7 +55,7 @@ def session_dataset(path: Path, *, unblinded: bool = False) -> Dataset:
         mass_sources={one.descriptor.object_name: "stated in the session" for one in facts},
         gripper=_gripper(facts),
         trials=trials,
-        left_out=tuple(_left_out(trial, name) for trial in state.order if trial not in counted),
+        left_out=tuple(_left_out(t, name) for t in state.order if t.status != "labelled"),
         pose_error=_pose_error(trials, _station_error(folder)),
         notes=_notes(counted, unblinded),
     )
