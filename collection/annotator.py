@@ -7,13 +7,19 @@ The journal is told first; the annotation files mirror its events.
 from __future__ import annotations
 
 import multiprocessing
+import os
+import threading
 from collections import deque
 from collections.abc import Callable, Sequence
-from concurrent.futures import Future, ProcessPoolExecutor
+from concurrent.futures import Future, ProcessPoolExecutor, wait
+from concurrent.futures.process import BrokenProcessPool
+from contextlib import suppress
 from dataclasses import dataclass
+from multiprocessing.connection import Connection
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Self
+from typing import TYPE_CHECKING, Any, Self, TypeVar
 
+from logs.errors import LogError
 from logs.events import Entry, Scored
 from logs.mirror import AnnotationMirror
 
@@ -25,8 +31,10 @@ if TYPE_CHECKING:
     from logs.state import TakeState
     from reach.pose_error import PoseError
 
-BACKLOG = 12
-"""Takes that may wait for their scores before the session waits for them."""
+_Result = TypeVar("_Result")
+
+LOOK_PERIOD = 0.2
+"""Seconds between looks at whether the session is to end, while scores are waited for."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -38,7 +46,10 @@ class _Waiting:
 
 
 class Annotator:
-    """Annotates takes in the background; a context manager that finishes them at its end.
+    """Annotates takes in the background; a context manager.
+
+    Nobody waits for it before `finish`, and what it cannot do fails no session. Leaving is quick
+    and gives up what is not done: whoever resumes the session gets it then.
 
     Args:
         session: the session.
@@ -46,6 +57,7 @@ class Annotator:
         journal: the controller's journal.
         models: names of the models that score each take.
         pose_error: of the station, beside registration's own.
+        say: tells the operator what could not be done.
     """
 
     def __init__(
@@ -55,23 +67,28 @@ class Annotator:
         journal: MirroredJournal,
         models: Sequence[str],
         pose_error: PoseError,
+        say: Callable[[str], None],
     ) -> None:
         self._session = session
         self._controller = controller
         self._journal = journal
         self._models = tuple(models)
         self._pose_error = pose_error
-        self._pool = ProcessPoolExecutor(1, multiprocessing.get_context("forkserver"))
+        self._say = say
+        context = multiprocessing.get_context("forkserver")
+        lifeline, self._lifeline = context.Pipe(duplex=False)
+        self._pool = ProcessPoolExecutor(
+            1, context, initializer=_end_with_session, initargs=(lifeline,)
+        )
         self._waiting: deque[_Waiting] = deque()
         self._views: list[Future[None]] = []
 
     def __enter__(self) -> Self:
         return self
 
-    def __exit__(self, kind: type[BaseException] | None, *_: object) -> None:
-        if kind is None:
-            self.finish()
-        self._pool.shutdown(wait=kind is None, cancel_futures=True)
+    def __exit__(self, *_: object) -> None:
+        self._lifeline.close()
+        self._pool.shutdown(wait=True, cancel_futures=True)
 
     def lacks(self, take: TakeState) -> bool:
         """Whether a take has not got all its scores."""
@@ -82,10 +99,9 @@ class Annotator:
         assert take.record is not None
         folder = (self._session.path / take.record).parent
         missing = [name for name in self._models if name not in take.scores]
-        job = self._pool.submit(_score, folder, missing, self._pose_error)
-        self._waiting.append(_Waiting(trial_id, take.take, folder, job))
-        while len(self._waiting) > BACKLOG:
-            self._store(self._waiting.popleft())
+        job = self._submit(_score, folder, missing, self._pose_error)
+        if job is not None:
+            self._waiting.append(_Waiting(trial_id, take.take, folder, job))
         self.collect()
 
     def collect(self) -> None:
@@ -95,26 +111,47 @@ class Annotator:
         done = [view for view in self._views if view.done()]
         self._views = [view for view in self._views if view not in done]
         for view in done:
-            view.result()
+            self._result(view, "a view was not drawn")
 
-    def finish(self, progress: Callable[[int], None] | None = None) -> None:
-        """Wait until every take is annotated; `progress` hears how many are left."""
-        while self._waiting:
-            if progress is not None:
-                progress(len(self._waiting))
-            self._store(self._waiting.popleft())
-        for view in self._views:
-            view.result()
-        self._views.clear()
+    def finish(self, progress: Callable[[int], None]) -> None:
+        """Wait until every take is annotated, or the session is to end.
+
+        Args:
+            progress: hears how many takes are left.
+        """
+        while (self._waiting or self._views) and not self._controller.ending:
+            progress(len(self._waiting))
+            oldest: Future[Any] = self._waiting[0].predictions if self._waiting else self._views[0]
+            wait([oldest], LOOK_PERIOD)
+            self.collect()
+        if self._waiting:
+            self._say(f"{len(self._waiting)} takes are not scored yet; --resume scores them")
 
     def _store(self, waiting: _Waiting) -> None:
-        for prediction in waiting.predictions.result():
+        for prediction in self._result(waiting.predictions, "a take was not scored") or ():
             entry = self._controller.record(
                 scored_event(waiting.trial_id, waiting.take, prediction)
             )
-            mirror_score(self._journal.mirror, entry, prediction)
+            with suppress(LogError):  # the journal has it; recovery writes the file
+                mirror_score(self._journal.mirror, entry, prediction)
         self._journal.wait_mirrored()  # the view shows the label, too
-        self._views.append(self._pool.submit(_derive_view, waiting.folder))
+        view = self._submit(_derive_view, waiting.folder)
+        if view is not None:
+            self._views.append(view)
+
+    def _submit(self, call: Callable[..., _Result], *arguments: object) -> Future[_Result] | None:
+        try:
+            return self._pool.submit(call, *arguments)
+        except BrokenProcessPool as error:
+            self._say(f"{arguments[0]}: neither scored nor drawn in this sitting ({error})")
+            return None
+
+    def _result(self, job: Future[_Result], failed: str) -> _Result | None:
+        try:
+            return job.result()
+        except Exception as error:  # whatever it was: the trial is recorded and labelled
+            self._say(f"{failed}: {type(error).__name__}: {error}")
+            return None
 
 
 def scored_event(trial_id: str, take: int, prediction: Prediction) -> Scored:
@@ -143,6 +180,17 @@ def mirror_score(mirror: AnnotationMirror, entry: Entry, prediction: Prediction)
         seconds=prediction.score.seconds,
         explanation=str(prediction.score.details.get("reason", "")),
     )
+
+
+def _end_with_session(lifeline: Connection) -> None:
+    """In the process beside: leave at once when the session does, or when it was killed."""
+
+    def watch() -> None:
+        with suppress(EOFError):
+            lifeline.recv()
+        os._exit(0)
+
+    threading.Thread(target=watch, name="session watch", daemon=True).start()
 
 
 def _score(folder: Path, models: Sequence[str], pose_error: PoseError) -> list[Prediction]:

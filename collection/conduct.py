@@ -4,10 +4,9 @@ from __future__ import annotations
 
 import getpass
 import json
-import signal
 import sys
-from collections.abc import Iterator, Mapping
-from contextlib import ExitStack, contextmanager
+from collections.abc import Mapping
+from contextlib import ExitStack
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
@@ -166,6 +165,7 @@ def _check_operator(options: SessionOptions, station: Station) -> None:
 def _run(
     asked: Conduct, folder: SessionFolder, setup: Setup, station: Station, terminal: Console
 ) -> None:
+    from collection.ending import stop_station
     from labeling.controller import SessionController
     from logs.disk import trials_left
     from logs.mirror import AnnotationMirror
@@ -181,7 +181,7 @@ def _run(
     controller = SessionController(
         journal,
         state,
-        stop=lambda: _stop(station),
+        stop=lambda: stop_station(station),
         trials_left=lambda: trials_left(folder.trials),
     )
     auto = setup.options.operator == "auto"
@@ -197,7 +197,8 @@ def _run(
             accept=asked.accepted,
         )
         _lead(folder, setup, station, controller, journal, terminal)
-        status = "finished" if state.next_work() is None else "ended"
+        whole = state.next_work() is None and not controller.ending
+        status = "finished" if whole else "ended"
     except ReachError as error:
         reason = str(error)
         raise
@@ -207,17 +208,6 @@ def _run(
     finally:
         controller.close(status, reason)
     _sum_up(asked, folder, terminal)
-
-
-def _stop(station: Station) -> None:
-    """Stop arm and hand, both whatever becomes of the other.
-
-    Raises:
-        RobotError: a stop did not reach its device; the operator must use the hardware stop.
-    """
-    with ExitStack() as stops:  # runs every one, and raises what went wrong
-        stops.callback(station.gripper.stop)
-        stops.callback(station.arm.stop)
 
 
 def _lead(
@@ -230,6 +220,7 @@ def _lead(
 ) -> None:
     """Bring loop, operator, annotator and progress together, until the session ends."""
     from collection.annotator import Annotator
+    from collection.ending import ending_on_signals
     from collection.operators import WebConsole, simulated_operator
     from collection.progress import SessionProgress
     from collection.session import Session
@@ -251,7 +242,12 @@ def _lead(
         progress = stack.enter_context(SessionProgress(controller, terminal))
         annotator = stack.enter_context(
             Annotator(
-                folder, controller, journal, options.models, station.config.pose_error.total()
+                folder,
+                controller,
+                journal,
+                options.models,
+                station.config.pose_error.total(),
+                progress.say,
             )
         )
         session = Session(
@@ -263,7 +259,7 @@ def _lead(
             attended=options.operator != "auto",
             say=progress.say,
         )
-        stack.enter_context(_ending_on_signals(controller))
+        stack.enter_context(ending_on_signals(controller, station, progress.say))
         if options.operator == "auto":
             stack.enter_context(simulated_operator(controller, station, setup))
         else:
@@ -273,16 +269,6 @@ def _lead(
         session.annotate_earlier()
         session.run()
         annotator.finish(progress.scoring)
-
-
-@contextmanager
-def _ending_on_signals(controller: SessionController) -> Iterator[None]:
-    """SIGTERM ends the session in order: the robot finishes its motion, the journal its line."""
-    before = signal.signal(signal.SIGTERM, lambda *_: controller.request_end())
-    try:
-        yield
-    finally:
-        signal.signal(signal.SIGTERM, before)
 
 
 def _sum_up(asked: Conduct, folder: SessionFolder, terminal: Console) -> None:
@@ -310,7 +296,9 @@ def _sum_up(asked: Conduct, folder: SessionFolder, terminal: Console) -> None:
 
 
 def _write_report(asked: Conduct, folder: SessionFolder, terminal: Console) -> Path | None:
-    if not asked.report or folder.read_state().counts().labelled == 0:
+    state = folder.read_state()
+    finished = state.closed is not None and state.closed.status == "finished"
+    if not (asked.report and finished and state.counts().labelled):
         return None
     from collection.reporting import write_report
 

@@ -145,6 +145,11 @@ class SessionController:
         return not (self._state.stopped or self._state.paused or self._state.holds)
 
     @property
+    def ending(self) -> bool:
+        """True once the session is asked to end."""
+        return self._ending
+
+    @property
     def closed(self) -> bool:
         """True once the session's writer has ended."""
         return self._closed

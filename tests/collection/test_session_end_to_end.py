@@ -1,8 +1,6 @@
 """One real simulated session, run as a user runs it, and everything that must be true of it."""
 
 import json
-import os
-import signal
 import subprocess
 import sys
 import time
@@ -171,43 +169,6 @@ def test_the_same_seed_plans_and_places_the_same(session, tmp_path):
     first, second = read_record((again / one).parent), read_record((out / one).parent)
     assert first.descriptor.seed == second.descriptor.seed
     assert (first.depth[0].depth == second.depth[0].depth).sum() > 0.9 * first.depth[0].depth.size
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("kills", [int(os.environ.get("REACH_KILLS", "3"))])
-def test_killed_anywhere_the_session_loses_nothing(session, tmp_path, kills):
-    """SIGKILL at moments spread over the session; then the rest runs through."""
-    reference, _ = session
-    out = tmp_path / "killed"
-    labels: dict[str, object] = {}
-    for n in range(kills):
-        arguments = command(out) if not out.exists() else ["collect", "--resume", "--out", str(out)]
-        process = subprocess.Popen(
-            [REACH, *arguments], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL
-        )
-        # Moments differ from run to run: some fall into planning, some into motion or scoring.
-        deadline = time.monotonic() + 6 + 5 * n
-        while time.monotonic() < deadline and process.poll() is None:
-            process.poll()
-            time.sleep(0.05)
-        process.send_signal(signal.SIGKILL)
-        process.wait()
-        if not out.exists():
-            continue
-        kept = {t.trial_id: t.label for t in SessionFolder.open(out).read_state().order if t.label}
-        for trial_id, label in labels.items():
-            assert kept[trial_id] == label, "a stored label was lost or changed"
-        labels = kept
-    arguments = ["collect", "--resume", "--out", str(out), "--no-report", "--json"]
-    if not out.exists():
-        arguments = command(out, "--json")
-    done = subprocess.run([REACH, *arguments], capture_output=True, text=True, timeout=280)
-    assert done.returncode == 0, done.stderr
-    assert json.loads(done.stdout)["unlabelled"] == 0
-    assert (out / "plan.json").read_text() == (reference / "plan.json").read_text()
-    final = {t.trial_id: t.label for t in SessionFolder.open(out).read_state().order}
-    for trial_id, label in labels.items():
-        assert final[trial_id] == label
 
 
 def executed_records(out):
