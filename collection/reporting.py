@@ -34,7 +34,7 @@ def write_report(
     models: Sequence[str] = REPORT_MODELS,
     pose_error: str | None = None,
     seed: int = 0,
-    backend: str = "serial",
+    backend: str = "threading",
     unblinded: bool = False,
     progress: Callable[[str, int, int], None] | None = None,
 ) -> Evaluation:

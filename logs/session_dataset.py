@@ -250,7 +250,15 @@ def _pose_error(
         basis += ", and calibration and actuation as the station file states them"
     else:
         basis += "; calibration and actuation not included"
-    return StatedPoseError(float(np.sqrt(translation)), float(np.sqrt(rotation)), basis)
+    return StatedPoseError(_stated(translation), _stated(rotation), basis)
+
+
+def _stated(variance: float) -> float:
+    """Standard deviation to two digits: more are noise, and every new trial would change them.
+
+    Cached scores hold under one pose error; a session that goes on keeps them.
+    """
+    return float(f"{np.sqrt(variance):.1e}")
 
 
 def _notes(trials: Sequence[TrialState], unblinded: bool) -> tuple[str, ...]:

@@ -37,7 +37,7 @@ def evaluate(
     seed: Annotated[int, typer.Option(help="Of perturbations, draws and bootstrap.")] = 0,
     backend: Annotated[
         str, typer.Option(help="Where scores are computed: serial, threading, loky or dask.")
-    ] = "serial",
+    ] = "threading",
     scheduler: Annotated[
         str | None, typer.Option(help="Address of a running Dask scheduler, for --backend dask.")
     ] = None,

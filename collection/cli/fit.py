@@ -22,7 +22,7 @@ def fit(
     seed: Annotated[int, typer.Option(help="Of the perturbations.")] = 0,
     backend: Annotated[
         str, typer.Option(help="Where scores are computed: serial, threading or loky.")
-    ] = "serial",
+    ] = "threading",
     as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object.")] = False,
 ) -> None:
     """Estimate friction, compliance and pose error, with intervals.

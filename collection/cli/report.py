@@ -26,7 +26,7 @@ def report(
     seed: Annotated[int, typer.Option(help="Of perturbations and bootstrap.")] = 0,
     backend: Annotated[
         str, typer.Option(help="Where scores are computed: serial, threading, loky or dask.")
-    ] = "serial",
+    ] = "threading",
     unblinded: Annotated[
         bool, typer.Option(help="Let labels given after seeing a prediction replace blind ones.")
     ] = False,

@@ -20,8 +20,8 @@ if TYPE_CHECKING:
     from reach.pose_error import PoseError
 
 BACKENDS = ("serial", "threading", "loky", "dask")
-TIMED_AGAIN = 3
-"""Grasps scored once more to measure the time when all scores came from the cache."""
+TIMED_AGAIN = 5
+"""Grasps scored once more, one after the other, where this run's times would mislead."""
 
 Progress = Callable[[int, int], None]
 """Called with the number of grasps done and their total."""
@@ -99,12 +99,20 @@ def score_cases(
         done += 1
         if progress:
             progress(done, len(cases))
-    if not seconds:
-        some = [(i, cases[i].scene, cases[i].grasp) for i in range(min(TIMED_AGAIN, len(cases)))]
-        seconds = [t for _, _, t in _run(scorer, some, pose_error, seed, "serial", 1)]
+    if not seconds or backend != "serial":
+        seconds = _seconds_alone(cases, scorer, pose_error, seed)
     return ScoredModel(
         scorer.name, scorer.version, dict(scorer.parameters), values, float(np.median(seconds))
     )
+
+
+def _seconds_alone(
+    cases: Sequence[GraspCase], scorer: Scorer, pose_error: PoseError | None, seed: int
+) -> list[float]:
+    """Times of a few grasps from all over the list, with nothing else running in this process."""
+    places = np.linspace(0, len(cases) - 1, min(TIMED_AGAIN, len(cases))).astype(int)
+    some = [(int(i), cases[i].scene, cases[i].grasp) for i in places]
+    return [seconds for _, _, seconds in _run(scorer, some, pose_error, seed, "serial", 1)]
 
 
 def _model_key(scorer: Scorer, pose_error: PoseError | None, seed: int) -> str:

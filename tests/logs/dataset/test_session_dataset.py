@@ -169,8 +169,10 @@ def test_station_errors_add_to_the_registrations_own(session):
     }
     path.write_text(json.dumps(content))
     stated = session_dataset(session.path).pose_error
-    assert stated.translation == pytest.approx(np.hypot(plain.translation, 5e-3))
+    assert stated.translation == pytest.approx(np.hypot(plain.translation, 5e-3), rel=0.05)
     assert stated.rotation == plain.rotation
+    for value in (stated.translation, stated.rotation):
+        assert value == float(f"{value:.1e}")  # two digits: one more trial keeps cached scores
 
 
 def test_an_empty_session_is_refused_in_one_line(tmp_path, sessions):
