@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 
 from reach.arrays import FloatArray, IntArray
-from reach.kernels.clipping import clip
+from reach.kernels.clipping import cut
 from reach.kernels.compiling import compiled
 
 CELLS = 3
@@ -169,11 +169,9 @@ def _between(
     """Clip a polygon in place to low <= coordinate <= high along pad x (0) or y (1)."""
     ax, ay = (1.0, 0.0) if axis == 0 else (0.0, 1.0)
     if low > -np.inf:
-        count = clip(polygon, count, -ax, -ay, 0.0, -low, spare)
-        _copy(spare, count, polygon)
+        count = cut(polygon, count, -ax, -ay, 0.0, -low, spare)
     if high < np.inf:
-        count = clip(polygon, count, ax, ay, 0.0, high, spare)
-        _copy(spare, count, polygon)
+        count = cut(polygon, count, ax, ay, 0.0, high, spare)
     return count
 
 
@@ -207,7 +205,7 @@ def cell_moments(
     size_x = max((high_x - low_x) / CELLS, 1e-9)
     size_y = max((high_y - low_y) / CELLS, 1e-9)
     per_x, per_y = 1.0 / size_x, 1.0 / size_y
-    strip, cell, spare = np.empty((12, 3)), np.empty((12, 3)), np.empty((12, 3))
+    strip, cell, spare = np.empty((12, 3)), np.empty((12, 3)), np.empty((12, 4))
     rows = 0
     for t in range(count):
         nx, ny, nz = normals[t, 0], normals[t, 1], normals[t, 2]
@@ -227,22 +225,14 @@ def cell_moments(
             if sums[group, 22] == 0.0:
                 used[rows] = group
                 rows += 1
-            for i in range(3):
-                for axis in range(3):
-                    cell[i, axis] = triangles[t, i, axis]
-            add_moments(cell, 0, 1, 2, nx, ny, nz, high, sums, group)
+            add_moments(triangles[t], 0, 1, 2, nx, ny, nz, high, sums, group)
             if sums[group, 22] == 0.0:
                 rows -= 1
             continue
-        for i in range(3):
-            for axis in range(3):
-                strip[i, axis] = triangles[t, i, axis]
         for ix in range(first_x, last_x + 1):
             n = 3
+            _copy(triangles[t], n, strip)
             if first_x < last_x:
-                for i in range(3):
-                    for axis in range(3):
-                        strip[i, axis] = triangles[t, i, axis]
                 lower = low_x + ix * size_x if ix > first_x else -np.inf
                 upper = low_x + (ix + 1) * size_x if ix < last_x else np.inf
                 n = _between(strip, n, 0, lower, upper, spare)

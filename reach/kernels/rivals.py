@@ -8,8 +8,8 @@ from reach.arrays import FloatArray, IntArray
 from reach.kernels.compiling import compiled
 from reach.kernels.elements import POINT, wrench_in_frame
 from reach.kernels.pads import Pads
-from reach.kernels.patch import NEVER, STACK, facing_triangle_in_pad, node_in_prism
-from reach.kernels.tree import MeshTree
+from reach.kernels.prism import NEVER, node_in_prism, normal_in_pad, triangle_in_pad
+from reach.kernels.tree import STACK, MeshTree
 from reach.kernels.verdict import (
     NO_CONTACT,
     Workspace,
@@ -35,7 +35,7 @@ def first_hit(mesh: MeshTree, T: FloatArray, low: float, high: float) -> tuple[f
     here = np.zeros(4)
     leaves = len(mesh.starts) - 1
     stack = np.empty(STACK, np.int64)
-    c = np.empty((3, 3))
+    c, normal = np.empty((3, 3)), np.empty(3)
     stack[0] = 0
     size = 1
     while size > 0:
@@ -48,8 +48,9 @@ def first_hit(mesh: MeshTree, T: FloatArray, low: float, high: float) -> tuple[f
             size += 2
             continue
         for triangle in range(mesh.starts[node - leaves + 1], mesh.starts[node - leaves + 2]):
-            if not facing_triangle_in_pad(mesh.corners, mesh.inward, triangle, T, c):
+            if not normal_in_pad(mesh.inward, triangle, T, normal):
                 continue
+            triangle_in_pad(mesh.corners, triangle, T, c)
             w0 = c[1, 0] * c[2, 1] - c[1, 1] * c[2, 0]
             w1 = c[2, 0] * c[0, 1] - c[2, 1] * c[0, 0]
             w2 = c[0, 0] * c[1, 1] - c[0, 1] * c[1, 0]

@@ -14,7 +14,8 @@ from reach.arrays import FloatArray, IntArray
 from reach.kernels.compiling import compiled
 from reach.kernels.elements import POINT, wrench_in_frame
 from reach.kernels.pads import Pads
-from reach.kernels.patch import NEVER, contact_depth
+from reach.kernels.patch import contact_depth
+from reach.kernels.prism import NEVER, most_pieces
 from reach.kernels.settle_balance import residual
 from reach.kernels.settle_contact import GROUPS, SUMS, add_layer, friction_points_of
 from reach.kernels.settle_motion import (
@@ -29,7 +30,6 @@ from reach.kernels.settle_press import (
     DEEPEST,
     columns_of,
     gather,
-    most_pieces,
     pieces_over_pad,
     press,
     pressed,

@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 
 from reach.arrays import FloatArray, IntArray
-from reach.kernels.clipping import clip
+from reach.kernels.clipping import cut
 from reach.kernels.compiling import compiled
 from reach.kernels.moments import CLASSES, normal_class
 
@@ -125,7 +125,7 @@ def add_layer(
     size_x = max((high_x - low_x) / CELLS, 1e-9)
     size_y = max((high_y - low_y) / CELLS, 1e-9)
     whole, strip = np.empty((16, 3)), np.empty((16, 3))
-    cell, spare = np.empty((16, 3)), np.empty((16, 3))
+    cell, spare = np.empty((16, 3)), np.empty((16, 4))
     area = 0.0
     for t in range(count):
         corners = 3
@@ -133,12 +133,11 @@ def add_layer(
         most = max(triangles[t, 0, 2], triangles[t, 1, 2], triangles[t, 2, 2])
         if least >= high:
             continue
+        whole[:3] = triangles[t]
         if most > high:
-            corners = clip(triangles[t], 3, 0.0, 0.0, 1.0, high, whole)
+            corners = cut(whole, 3, 0.0, 0.0, 1.0, high, spare)
             if corners == 0:
                 continue
-        else:
-            whole[:3] = triangles[t]
         n = normals[t]
         kind = normal_class(n[0], n[1], n[2])
         x0, x1, y0, y1, sx, sy = np.inf, -np.inf, np.inf, -np.inf, 0.0, 0.0
@@ -156,20 +155,16 @@ def add_layer(
             inside = corners
             strip[:corners] = whole[:corners]
             if ix > ix0:
-                inside = clip(strip, inside, -1.0, 0.0, 0.0, -(low_x + ix * size_x), spare)
-                strip[:inside] = spare[:inside]
+                inside = cut(strip, inside, -1.0, 0.0, 0.0, -(low_x + ix * size_x), spare)
             if ix < ix1:
-                inside = clip(strip, inside, 1.0, 0.0, 0.0, low_x + (ix + 1) * size_x, spare)
-                strip[:inside] = spare[:inside]
+                inside = cut(strip, inside, 1.0, 0.0, 0.0, low_x + (ix + 1) * size_x, spare)
             for iy in range(iy0, iy1 + 1):
                 left = inside
                 cell[:left] = strip[:left]
                 if iy > iy0:
-                    left = clip(cell, left, 0.0, -1.0, 0.0, -(low_y + iy * size_y), spare)
-                    cell[:left] = spare[:left]
+                    left = cut(cell, left, 0.0, -1.0, 0.0, -(low_y + iy * size_y), spare)
                 if iy < iy1:
-                    left = clip(cell, left, 0.0, 1.0, 0.0, low_y + (iy + 1) * size_y, spare)
-                    cell[:left] = spare[:left]
+                    left = cut(cell, left, 0.0, 1.0, 0.0, low_y + (iy + 1) * size_y, spare)
                 if left < 3:
                     continue
                 group = (ix * CELLS + iy) * CLASSES + kind

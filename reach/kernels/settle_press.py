@@ -15,15 +15,16 @@ import numpy as np
 
 from reach.arrays import FloatArray, IntArray
 from reach.kernels.compiling import compiled
-from reach.kernels.patch import (
+from reach.kernels.prism import (
     OUTSIDE,
     POLYGON_ROOM,
-    STACK,
     clip_to_prism,
     node_in_prism,
+    normal_in_pad,
     place_triangle,
+    triangle_in_pad,
 )
-from reach.kernels.tree import MeshTree
+from reach.kernels.tree import STACK, MeshTree
 
 BACKING = 20.0
 """Stiffness of what lies behind the deformable layer, in parts of the layer's own."""
@@ -135,35 +136,27 @@ def pieces_over_pad(
     Returns:
         Number of pieces.
     """
-    corners = np.empty((3, 3))
-    first = np.empty((len(edges) + POLYGON_ROOM, 3))
-    second = np.empty((len(edges) + POLYGON_ROOM, 3))
+    corners, normal = np.empty((3, 3)), np.empty(3)
+    polygon = np.empty((len(edges) + POLYGON_ROOM, 3))
+    spare = np.empty((len(edges) + POLYGON_ROOM, 4))
     mesh_corners, inward = mesh.corners, mesh.inward
     found = 0
     for index in range(len(listed)):
         t = listed[index]
-        state = place_triangle(mesh_corners, inward, t, T, edges, low, high, corners)
-        if state == OUTSIDE:
+        if not normal_in_pad(inward, t, T, normal):
             continue
-        polygon = clip_to_prism(corners, edges, low, high, first, second)
-        for i in range(1, polygon - 1):
+        triangle_in_pad(mesh_corners, t, T, corners)
+        if place_triangle(corners, edges, low, high) == OUTSIDE:
+            continue
+        count = clip_to_prism(corners, edges, low, high, polygon, spare)
+        for i in range(1, count - 1):
             for axis in range(3):
-                triangles[found, 0, axis] = first[0, axis]
-                triangles[found, 1, axis] = first[i, axis]
-                triangles[found, 2, axis] = first[i + 1, axis]
-                normals[found, axis] = (
-                    T[0, axis] * inward[t, 0]
-                    + T[1, axis] * inward[t, 1]
-                    + T[2, axis] * inward[t, 2]
-                )
+                triangles[found, 0, axis] = polygon[0, axis]
+                triangles[found, 1, axis] = polygon[i, axis]
+                triangles[found, 2, axis] = polygon[i + 1, axis]
+                normals[found, axis] = normal[axis]
             found += 1
     return found
-
-
-@compiled
-def most_pieces(edges: int) -> int:
-    """Most triangles that one triangle is cut into by an outline's edges and two depths."""
-    return edges + 3
 
 
 @compiled

@@ -13,9 +13,12 @@ from weakref import WeakKeyDictionary
 import numpy as np
 
 from reach.arrays import FloatArray, IntArray
+from reach.kernels.compiling import compiled
 from reach.objects import GraspObject
 
-TRIANGLES_PER_LEAF = 4
+TRIANGLES_PER_LEAF = 16
+STACK = 64
+"""Room for the nodes that a walk through a tree has yet to visit: one a level, and one more."""
 
 
 class MeshTree(NamedTuple):
@@ -84,3 +87,12 @@ def _boxes(corners: FloatArray, starts: IntArray) -> FloatArray:
     lows = np.concatenate([level[0] for level in reversed(levels)])
     highs = np.concatenate([level[1] for level in reversed(levels)])
     return np.ascontiguousarray(np.hstack([(lows + highs) / 2, (highs - lows) / 2]))
+
+
+@compiled
+def leaves_below(node: int, leaves: int) -> tuple[int, int]:
+    """First leaf below a node, and the leaf after the last one."""
+    first = last = node
+    while first < leaves - 1:
+        first, last = 2 * first + 1, 2 * last + 2
+    return first - (leaves - 1), last - (leaves - 2)

@@ -12,7 +12,8 @@ from reach.kernels.elements import POINT, friction_points, wrench_in_frame
 from reach.kernels.min_norm import exit_of_ray
 from reach.kernels.moments import GROUPS, MOMENTS, cell_moments
 from reach.kernels.pads import Pads
-from reach.kernels.patch import NEVER, collect_patch, contact_depth
+from reach.kernels.patch import collect_patch, contact_depth
+from reach.kernels.prism import NEVER
 from reach.kernels.tree import MeshTree
 
 HOLDS, NO_CONTACT, SLIPS, TURNS = 0, 1, 2, 3
@@ -30,7 +31,6 @@ class Workspace(NamedTuple):
 
     triangles: FloatArray
     normals: FloatArray
-    owners: IntArray
     sums: FloatArray
     used: IntArray
     points: FloatArray
@@ -42,7 +42,6 @@ def make_workspace(jaws: int) -> Workspace:
     return Workspace(
         np.empty((FIRST_ROOM, 3, 3)),
         np.empty((FIRST_ROOM, 3)),
-        np.empty(FIRST_ROOM, np.int64),
         np.zeros((GROUPS, MOMENTS)),
         np.empty(GROUPS, np.int64),
         np.empty((POINT, jaws * GROUPS * 4)),
@@ -92,7 +91,7 @@ def find_patch(
         jaw: which jaw.
         T_object_pad: pose of the opened pad, shape (4, 4).
         depth: how deep the pad is pressed in, d_def [m].
-        space: receives `triangles`, `normals` and `owners`.
+        space: receives `triangles` and `normals`.
 
     Returns:
         Number of triangles (0 without contact), depth d_con + d_def [m], and the workspace, which
@@ -103,25 +102,10 @@ def find_patch(
     if first == NEVER:
         return 0, NEVER, space
     high = first + depth
-    count, triangles, owners = collect_patch(
-        mesh, T_object_pad, edges, box, first, high, space.triangles, space.owners
+    count, triangles, normals = collect_patch(
+        mesh, T_object_pad, edges, first, high, space.triangles, space.normals
     )
-    normals, inward = space.normals, mesh.inward
-    if len(normals) < len(owners):
-        normals = np.empty((len(owners), 3))
-    for t in range(count):
-        owner = owners[t]
-        for i in range(3):
-            normals[t, i] = (
-                T_object_pad[0, i] * inward[owner, 0]
-                + T_object_pad[1, i] * inward[owner, 1]
-                + T_object_pad[2, i] * inward[owner, 2]
-            )
-    return (
-        count,
-        high,
-        Workspace(triangles, normals, owners, space.sums, space.used, space.points),
-    )
+    return count, high, Workspace(triangles, normals, space.sums, space.used, space.points)
 
 
 @compiled
