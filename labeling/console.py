@@ -52,6 +52,8 @@ class Console:
         simulated: the station is simulated.
         practice: nothing is stored.
         second: a second operator labels blindly, for agreement (review only).
+        sitting_since: undo takes back what was decided after this entry of the journal; a review
+            leaves earlier sittings' verdicts alone unless one is taken back by name.
         hold_without_console: hold the session while nobody is connected.
     """
 
@@ -66,4 +68,5 @@ class Console:
     simulated: bool = False
     practice: bool = False
     second: bool = False
+    sitting_since: int = 0
     hold_without_console: bool = True

@@ -44,6 +44,7 @@ def review_console(
             root=folder.path,
             simulated=folder.descriptor.simulated,
             second=second,
+            sitting_since=state.seq,
             hold_without_console=False,
         )
     finally:

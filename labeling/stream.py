@@ -13,6 +13,8 @@ from labeling.view import console_view
 
 TICK_PERIOD: Final = 0.5
 """Seconds between ticks; a console that misses several shows red and sends nothing."""
+VIEW_GAP: Final = 0.04
+"""Seconds between views: changes come in bursts, and each view costs the server and the page."""
 
 
 def _message(event: str, data: object) -> bytes:
@@ -53,13 +55,15 @@ async def console_stream(console: Console, streams: Streams) -> AsyncIterator[by
         shown = -1
         while not streams.leaving:
             changed.clear()
+            closed = console.controller.closed  # asked first: the last view tells of the end
             if console.controller.version != shown:
                 view = await asyncio.to_thread(console_view, console)
                 shown = view["version"]
                 yield _message("state", view)
+                await asyncio.sleep(VIEW_GAP)
             else:
                 yield _message("tick", {"tick": console.controller.tick(), "version": shown})
-            if console.controller.closed:
+            if closed:
                 return
             with suppress(TimeoutError):
                 await asyncio.wait_for(changed.wait(), TICK_PERIOD)

@@ -52,6 +52,7 @@ class TerminalConsole(App[None]):
         self._choosing: str | None = None
         self._relabel: str | None = None
         self._rotated = False
+        self._about_take: tuple[str | None, int | None] = (None, None)
         self._pending: Command | None = None
         self._note = ""
 
@@ -268,7 +269,17 @@ class TerminalConsole(App[None]):
             )
         if self._relabel not in [item["trial_id"] for item in view["history"]]:
             self._relabel = None
+        self._drop_foreign_choices()
         self.draw()
+
+    def _drop_foreign_choices(self) -> None:
+        """What was begun for one take never ends up on another: somebody else may have decided."""
+        about = self._target() or (self._view or {}).get("trial") or {}
+        if self._about_take != (about.get("trial_id"), about.get("take")):
+            self._about_take = (about.get("trial_id"), about.get("take"))
+            self._rotated = False
+            if self._choosing != "clear":
+                self._choosing = None
 
     def _refuse(self, message: str) -> None:
         self.bell()

@@ -57,7 +57,7 @@ def console_view(console: Console) -> View:
             "recordings": console.recordings is not no_recording,
             "second": console.second,
             "trial": _current(console, state),
-            "undoable": None if console.second else _undoable(state),
+            "undoable": None if console.second else _undoable(state, console.sitting_since),
             "recent_commands": list(state.commands)[-REMEMBERED_COMMANDS:],
             "next": _upcoming(state),
         }
@@ -154,8 +154,8 @@ def _current(console: Console, state: SessionState) -> View | None:
     }
 
 
-def _undoable(state: SessionState) -> View | None:
-    found = state.last_decision()
+def _undoable(state: SessionState, since: int) -> View | None:
+    found = state.last_decision(since)
     if found is None:
         return None
     trial, entry = found

@@ -90,9 +90,14 @@ class SessionState:
                     return trial
         return None
 
-    def last_decision(self) -> tuple[TrialState, Entry] | None:
-        """The newest decision that holds in the whole session: what undo would take back."""
+    def last_decision(self, after: int = 0) -> tuple[TrialState, Entry] | None:
+        """The newest decision that holds: what undo would take back.
+
+        Args:
+            after: only decisions that the journal got after this entry's number.
+        """
         made = [(trial, trial.decisions[-1]) for trial in self.trials.values() if trial.decisions]
+        made = [pair for pair in made if pair[1].seq > after]
         return max(made, key=lambda pair: pair[1].seq, default=None)
 
     def apply(self, entry: Entry) -> None:

@@ -8,6 +8,17 @@ export function element(tag, properties = {}, ...children) {
   return made;
 }
 
+// Builds a box's children anew only when their content has changed: a finger that is down on one of
+// them would otherwise press a button that is no longer there.
+const drawn = new WeakMap();
+
+export function redraw(box, content, build) {
+  const key = JSON.stringify(content);
+  if (drawn.get(box) === key) return;
+  drawn.set(box, key);
+  box.replaceChildren(...build());
+}
+
 const words = (value) => String(value ?? "").replaceAll("_", " ");
 const show = (id, visible) => { byId(id).hidden = !visible; };
 const text = (id, value) => { byId(id).textContent = value; };
@@ -62,10 +73,9 @@ export function drawTime(seconds) {
 }
 
 function drawSuccess(success) {
-  const rows = Object.entries(success).map(([name, [good, all]]) => element("tr", {},
+  redraw(byId("success").tBodies[0], success, () => Object.entries(success).map(([name, [good, all]]) => element("tr", {},
     element("td", {}, words(name), bar(good / Math.max(all, 1))),
-    element("td", {}, all ? `${good} of ${all}` : "–")));
-  byId("success").tBodies[0].replaceChildren(...rows);
+    element("td", {}, all ? `${good} of ${all}` : "–"))));
 }
 
 function bar(share) {

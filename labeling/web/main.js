@@ -1,7 +1,10 @@
 // The console's page: what a key means now, one command at a time, and what became of it.
 
-import { byId, drawBanner, drawRelabelBanner, drawSession, drawTime, drawTrial, element, receipt, trialItem } from "/draw.js";
+import { drawActions, drawChoices } from "/buttons.js";
+import { byId, describeLabel, drawBanner, drawRelabelBanner, drawSession, drawTime, drawTrial, redraw, trialItem } from "/draw.js";
+import { Commands, refuse } from "/commands.js";
 import { Keys, isTextField } from "/keys.js";
+import { drawKeyTable, drawLegend } from "/legend.js";
 import { Link } from "/link.js";
 import { Review } from "/review.js";
 import { allowSound, play } from "/sound.js";
@@ -17,12 +20,14 @@ const page = {
   terms: null,
   keys: null,
   rotated: false,
-  choosing: null, // "reason", "cause" or "skip": what the next key answers
+  choosing: null, // "reason", "cause", "skip" or "earlier": what the next digit answers
   relabel: null, // trial_id of a past trial the verdict keys are about
-  pending: null, // the command without an answer yet
+  about: "", // the trial and take that rotated and choosing belong to
 };
 
 const link = new Link(token, onView, () => draw());
+const commands = new Commands(link, () => draw(), afterStored);
+const send = (command, said) => commands.send(command, said);
 const stage = new Stage(link, onForwardedKey);
 const review = new Review(link, () => draw());
 
@@ -44,44 +49,22 @@ function target() {
   return due ? { ...trial, kind: "label" } : null;
 }
 
+// What was begun for one take never ends up on another: somebody else may have labeled it.
+function dropForeignChoices() {
+  const about = target() ?? page.view?.trial;
+  const key = about ? `${about.trial_id} ${about.take}` : "";
+  if (key === page.about) return;
+  page.about = key;
+  page.rotated = false;
+  page.choosing = null;
+}
+
 function effectiveState() {
   if (!page.view || !link.alive) return page.view?.state === "ENDED" ? "ENDED" : "LOST";
   return page.view.state;
 }
 
 // ---- commands -------------------------------------------------------------------------------
-
-async function send(command, said) {
-  if (!link.alive && command.kind !== "stop") return refuse("no connection: nothing was sent");
-  if (page.pending && command.kind !== "stop") return refuse("the last command has no answer yet");
-  const pending = { ...command, id: crypto.randomUUID() };
-  if (command.kind !== "stop") page.pending = pending;
-  draw();
-  const answer = await link.send(pending);
-  if (answer.status === "unconfirmed") {
-    page.pending = command.kind === "stop" ? page.pending : { ...pending, unconfirmed: true, said };
-    if (command.kind === "stop") refuse("THE STOP WAS NOT CONFIRMED: use the hardware stop", 10);
-    return draw();
-  }
-  settle(answer, pending, said);
-}
-
-function settle(answer, command, said) {
-  if (page.pending?.id === command.id) page.pending = null;
-  if (answer.status === "stored" || answer.status === "duplicate") {
-    receipt("stored", answer.message || `stored: ${said}`, answer.message ? 10 : 2.2);
-    play(command.value?.outcome ?? "stored");
-    afterStored(command);
-  } else {
-    refuse(`not stored: ${answer.message || answer.status}`);
-  }
-  draw();
-}
-
-function refuse(message, seconds = 4) {
-  receipt("refused", message, seconds);
-  play("refused");
-}
 
 function afterStored(command) {
   const decided = ["label", "relabel", "second_label", "redo", "skip", "void"].includes(command.kind);
@@ -92,15 +75,8 @@ function afterStored(command) {
     if (page.view.mode === "review") review.next();
   }
   if (command.kind === "undo" && page.view.mode === "run") page.relabel = command.trial_id;
+  if (command.kind === "undo" && page.view.mode === "review") review.goTo(command.trial_id);
   if (command.kind === "note") byId("note").value = "";
-}
-
-// A view arrived after a command without an answer: it tells what became of it.
-function resolvePending(view) {
-  if (!page.pending?.unconfirmed) return;
-  const stored = view.recent_commands.includes(page.pending.id);
-  settle(stored ? { status: "stored" } : { status: "rejected", message: "the connection was lost before it arrived; press again" },
-    page.pending, page.pending.said);
 }
 
 const note = () => byId("note").value.trim();
@@ -142,7 +118,7 @@ const ACTIONS = {
   },
   undo() {
     const undoable = page.view.undoable;
-    if (!undoable) return refuse("there is nothing to undo");
+    if (!undoable) return page.view.mode === "review" ? takeBack() : refuse("there is nothing to undo");
     const open = page.relabel && target();
     if (open && !open.label) return refuse(`label trial ${open.number} first, or leave it with x`);
     const said = `trial ${undoable.number}: its ${undoable.kind} no longer holds`;
@@ -169,6 +145,20 @@ function doSkip() {
   return send({ kind: "skip", trial_id: about.trial_id, rev: about.rev, value: { text: note() } }, `trial ${about.number} skipped`);
 }
 
+// A review undoes what this sitting decided; an earlier verdict only on its own trial, and asked.
+function takeBack() {
+  const about = target();
+  if (page.view.second) return refuse("nothing to undo: a new verdict on the trial replaces yours");
+  if (!about?.label) return refuse("there is nothing to undo");
+  return choose("earlier");
+}
+
+function doTakeBack() {
+  const about = target();
+  page.choosing = null;
+  return send({ kind: "undo", trial_id: about.trial_id, rev: about.rev }, `trial ${about.number}: its earlier label no longer holds`);
+}
+
 function doRedo(cause) {
   const about = subject();
   page.choosing = null;
@@ -191,6 +181,11 @@ function choices() {
   if (page.choosing === "reason") return page.terms.reasons.map(({ value, text }) => ({ text, run: () => verdict("failure", value) }));
   if (page.choosing === "cause") return page.terms.causes.map(({ value, text }) => ({ text, run: () => doRedo(value) }));
   if (page.choosing === "skip") return [{ text: "yes, skip this trial", run: doSkip }];
+  if (page.choosing === "earlier") {
+    const about = target();
+    const text = `yes: trial ${about?.number}'s earlier label (${describeLabel(about?.label)}) no longer holds`;
+    return about ? [{ text, run: doTakeBack }] : [];
+  }
   if (page.view?.state === "CONFIRM_POSE") {
     const rivals = page.view.trial.info.rivals ?? [];
     const poses = [{ text: "pose 1 (best)", run: () => acceptPose(0) },
@@ -214,7 +209,7 @@ function perform(action) {
     return draw();
   }
   if (action.other) return page.view.mode === "review" ? review.key(action.other) : undefined;
-  const keeps = { failure: "reason", redo: "cause", skip: "skip", stop: page.choosing }[action];
+  const keeps = { failure: "reason", redo: "cause", skip: "skip", undo: "earlier", stop: page.choosing }[action];
   if (page.choosing && page.choosing !== keeps) page.choosing = null;
   return ACTIONS[action]();
 }
@@ -262,34 +257,12 @@ function wire() {
     event.target.returnValue = "";
     send({ kind: "clear_stop", rev: page.view.control_rev, value: { confirm: true } }, "the stop is cleared");
   });
-  byId("open-keys").addEventListener("click", () => { drawKeys(); byId("keys").showModal(); });
-  byId("keys-default").addEventListener("click", () => { page.keys.reset(); drawLegend(); });
+  byId("open-keys").addEventListener("click", () => { drawKeyTable(page.keys, refuse); byId("keys").showModal(); });
+  byId("keys-default").addEventListener("click", () => { page.keys.reset(); drawLegend(page.keys); });
   setInterval(() => {
     const elapsed = page.view?.elapsed;
     if (elapsed != null && page.view.mode === "run" && page.view.state !== "ENDED") drawTime(elapsed + (performance.now() - page.viewAt) / 1000);
   }, 500);
-}
-
-function drawLegend() {
-  document.querySelectorAll("kbd[data-key]").forEach((cap) => { cap.textContent = page.keys.label(cap.dataset.key); });
-}
-
-function drawKeys() {
-  const rows = Object.keys(page.keys.defaults).filter((action) => action !== "stop").map((action) => {
-    const button = element("button", { type: "button", textContent: page.keys.label(action) });
-    button.addEventListener("click", () => {
-      button.textContent = "press a key …";
-      byId("keys").addEventListener("keydown", (event) => {
-        event.preventDefault();
-        const problem = event.key === "Escape" ? "" : page.keys.bind(action, event.key);
-        if (problem) refuse(problem);
-        drawLegend();
-        drawKeys();
-      }, { once: true });
-    });
-    return element("tr", {}, element("td", { textContent: action }), element("td", {}, button));
-  });
-  byId("key-table").replaceChildren(...rows);
 }
 
 // ---- drawing --------------------------------------------------------------------------------
@@ -298,17 +271,26 @@ function onView(view) {
   const asked = page.view?.trial?.phase;
   page.view = view;
   page.viewAt = performance.now();
-  resolvePending(view);
+  commands.resolve(view);
   if (view.trial?.phase === "AWAITING_LABEL" && asked && asked !== "AWAITING_LABEL") play("ask");
   if (page.relabel && !view.history.some((item) => item.trial_id === page.relabel)) page.relabel = null;
   if (view.mode === "review") review.refresh(view);
   draw();
 }
 
+// Views come in bursts: the page is painted once a frame, so that a key is never behind a queue.
+let painting = 0;
+
 function draw() {
+  dropForeignChoices();
+  painting ||= requestAnimationFrame(paint);
+}
+
+function paint() {
+  painting = 0;
   const { view } = page;
   const state = effectiveState();
-  byId("unconfirmed").hidden = !page.pending?.unconfirmed;
+  byId("unconfirmed").hidden = !commands.pending?.unconfirmed;
   if (!view) return drawBanner(state, null, null, link.problem);
   drawSession(view, link.alive);
   const about = target();
@@ -318,48 +300,16 @@ function draw() {
   drawRelabelBanner(["LOST", "STOPPED"].includes(state) ? null : again);
   byId("cancel-target").hidden ||= view.mode === "review";
   drawTrial(trial, state);
-  drawActions(state, about);
-  const items = view.history.map((item) => trialItem(item, item.trial_id === page.relabel, (chosen) => {
-    if (chosen.status !== "skipped") page.relabel = chosen.trial_id;
-    draw();
-  }));
-  byId("history").replaceChildren(...items);
+  const usable = link.alive && !commands.pending;
+  drawActions(page, state, about, usable);
+  drawChoices(page, choices(), usable, allowSound);
+  redraw(byId("history"), [view.history, page.relabel], () => view.history.map((item) => (
+    trialItem(item, item.trial_id === page.relabel, (chosen) => {
+      if (chosen.status !== "skipped") page.relabel = chosen.trial_id;
+      draw();
+    }))));
   byId("past").hidden = byId("by-object").hidden = view.mode === "review";
   stage.draw(view, trial);
-}
-
-function drawActions(state, about) {
-  const { view } = page;
-  const usable = link.alive && !page.pending;
-  const placing = view.trial?.phase === "PLACE_OBJECT" && !view.trial.placed && view.mode === "run" && !page.relabel;
-  const may = (id, allowed) => { byId(id).disabled = !(usable && allowed && state !== "STOPPED" && state !== "ENDED"); };
-  byId("do-placed").hidden = !placing;
-  may("do-placed", placing && state === "PLACE_OBJECT");
-  ["do-success", "do-failure", "do-rotated"].forEach((id) => { byId(id).hidden = placing; may(id, Boolean(about)); });
-  byId("do-rotated").setAttribute("aria-pressed", String(page.rotated));
-  may("do-undo", Boolean(view.undoable));
-  byId("undo-text").textContent = view.undoable ? `Undo ${view.undoable.kind} of ${view.undoable.number}` : "Undo";
-  const moving = view.trial?.phase === "EXECUTE";
-  for (const id of ["do-redo", "do-skip"]) {
-    byId(id).hidden = view.mode === "review";
-    may(id, Boolean(about ?? view.trial) && !moving);
-  }
-  byId("do-pause").hidden = view.mode === "review";
-  may("do-pause", true);
-  byId("pause-text").textContent = view.paused ? "Resume" : "Pause";
-  drawChoices(usable);
-}
-
-function drawChoices(usable) {
-  const box = byId("choices");
-  const offered = choices();
-  box.hidden = !offered.length;
-  box.className = page.choosing === "reason" ? "failure" : "";
-  box.replaceChildren(...offered.map(({ text, run }, index) => {
-    const button = element("button", { type: "button", disabled: !usable }, element("span", { textContent: text }), element("kbd", { textContent: index + 1 }));
-    button.addEventListener("click", () => { allowSound(); run(); });
-    return button;
-  }));
 }
 
 // ---- start ----------------------------------------------------------------------------------
@@ -378,7 +328,7 @@ for (;;) {
 }
 page.keys = new Keys(page.terms.keys);
 byId("rule").textContent = page.terms.rule;
-drawLegend();
+drawLegend(page.keys);
 draw();
 window.focus();
 document.body.dataset.ready = "true";

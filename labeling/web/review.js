@@ -53,6 +53,13 @@ export class Review {
     this.draw();
   }
 
+  // Back to a trial whose verdict was just taken back, if the filter still lists it.
+  goTo(trialId) {
+    const place = this.trials.findIndex((trial) => trial.trial_id === trialId);
+    if (place >= 0) this.place = place;
+    this.draw();
+  }
+
   key(key) {
     const step = { ArrowDown: 1, ArrowRight: 1, ArrowUp: -1, ArrowLeft: -1 }[key];
     if (!step) return;

@@ -311,6 +311,83 @@ def test_the_recording_is_shown_and_its_keys_still_label(
     assert bench.trial(1).label.outcome == "success"
 
 
+@pytest.fixture
+def reviewing(bench: Any, serve: Any, browser: Any) -> Page:
+    """The review of two trials that were labeled in an earlier sitting."""
+    bench.labelled("success")
+    bench.labelled("failure", reason="missed")
+    page = Page(browser, serve(bench, mode="review", sitting_since=bench.state.seq).link)
+    page.wait("return document.querySelectorAll('#review-list li').length === 2")
+    return page
+
+
+def test_undo_in_a_review_walks_back_this_sitting_only(bench: Any, reviewing: Page) -> None:
+    reviewing.press("f", "1")
+    reviewing.wait("return document.getElementById('trial-number').textContent === '2'")
+    reviewing.press("s")
+    reviewing.wait("return document.getElementById('undo-text').textContent.includes('of 2')")
+    for trial in ("2", "1"):
+        reviewing.press("u")
+        reviewing.wait(
+            "return document.getElementById('trial-number').textContent === arguments[0]", trial
+        )
+        reviewing.wait(
+            "return !document.getElementById('undo-text').textContent.includes('of ' + arguments[0])",
+            trial,
+        )
+    assert [bench.trial(n).label.outcome for n in (1, 2)] == ["success", "failure"]
+    assert labels(bench) == ["label", "label", "relabel", "relabel", "undo", "undo"]
+    reviewing.press("u", "u")
+    reviewing.press("t")
+    reviewing.wait("return document.getElementById('do-rotated').ariaPressed === 'true'")
+    assert labels(bench)[-3:] == ["relabel", "undo", "undo"]
+
+
+def test_an_earlier_label_is_taken_back_only_when_asked_on_its_trial(
+    bench: Any, reviewing: Page
+) -> None:
+    reviewing.press("\ue015")  # down, to the second trial
+    reviewing.wait("return document.getElementById('trial-number').textContent === '2'")
+    assert "Take back 2's label" in reviewing.element("undo-text").text
+    reviewing.press("u")
+    reviewing.wait("return !document.getElementById('choices').hidden")
+    assert "failure: missed" in reviewing.element("choices").text
+    assert labels(bench) == ["label", "label"]
+    reviewing.press("1")
+    reviewing.receipt("stored")
+    assert bench.trial(2).label is None and bench.trial(1).label is not None
+    assert labels(bench) == ["label", "label", "undo"]
+
+
+def test_what_was_begun_for_one_take_never_ends_up_on_another(bench: Any, awaiting: Page) -> None:
+    awaiting.press("t", "f")
+    awaiting.wait("return !document.getElementById('choices').hidden")
+    bench.do("label", 1, outcome="success")  # another console was faster
+    bench.executed()
+    awaiting.wait("return document.getElementById('trial-number').textContent === '2'")
+    awaiting.press("1")
+    assert awaiting.element("do-rotated").get_attribute("aria-pressed") == "false"
+    awaiting.press("s")
+    awaiting.receipt("stored")
+    label = bench.trial(2).label
+    assert (label.outcome, label.rotated) == ("success", False)
+
+
+def test_a_button_under_the_finger_stays_while_views_arrive(bench: Any, awaiting: Page) -> None:
+    awaiting.press("f")
+    awaiting.wait("return !document.getElementById('choices').hidden")
+    awaiting.run("window.pressed = document.querySelector('#choices button')")
+    take = bench.controller.begin(bench.trial(1))
+    for score in range(3):
+        take.record_score(f"model-{score}", "1", 0.5, {})
+    bench.controller.set_light("camera", ok=True)
+    awaiting.wait("return document.getElementById('light-camera').dataset.light === 'good'")
+    assert awaiting.run("return window.pressed.isConnected")
+    awaiting.run("window.pressed.click()")
+    awaiting.receipt("stored")
+    assert bench.trial(1).label.reason == "missed"
+
+
 def test_a_foreign_frame_s_keys_are_ignored(bench: Any, awaiting: Page) -> None:
     awaiting.run("window.postMessage({key: 's'}, '*')")
     awaiting.press("t")
