@@ -7,6 +7,8 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
+import numpy as np
+
 from collection.plan_records import PlannedGrasp, PlannedPose, PlannedTrial
 from collection.robots import protocol
 from collection.robots.execution import Execution, Phase
@@ -125,16 +127,23 @@ def registration_record(
 
 
 def execution_record(
-    execution: Execution, T_world_object: FloatArray, measured: Mapping[str, float]
+    execution: Execution,
+    T_world_object: FloatArray,
+    planned: PlannedGrasp,
+    measured: Mapping[str, float],
 ) -> ExecutionRecord:
     """What the robot really did.
 
     Args:
         execution: as the motion returned it.
         T_world_object: the registered pose the grasp was planned upon, shape (4, 4).
+        planned: the grasp that was asked for.
         measured: further numbers by name.
     """
     verdict = execution.sensor_verdict
+    as_planned = np.allclose(
+        execution.T_world_gripper_planned, T_world_object @ planned.T_object_gripper
+    )
     return ExecutionRecord(
         time_ns=next(s.start_ns for s in execution.phases if s.phase is Phase.CLOSE),
         T_world_gripper_commanded=execution.T_world_gripper_planned,
@@ -147,7 +156,10 @@ def execution_record(
             "force": verdict.force_held,
             **measured,
         },
-        details={"put_down_early": str(execution.put_down_early).lower()},
+        details={
+            "put_down_early": str(execution.put_down_early).lower(),
+            "half_turn": str(not as_planned).lower(),
+        },
     )
 
 

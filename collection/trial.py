@@ -19,6 +19,7 @@ import numpy as np
 from collection import record_mapping as mapping
 from collection.errors import PlacementError, UnreachableError, UnsafeMotionError
 from collection.robots.execution import Execution
+from collection.robots.half_turn import held_alike
 from collection.robots.motion import can_execute, execute_grasp
 from collection.trial_watch import TrialWatch
 from collection.truth import registration_error, true_outcome
@@ -28,7 +29,6 @@ from logs.mesh_attachment import mesh_attachment
 from logs.recorder import TrialRecorder
 from logs.records import AttachmentRecord, ExitStatus
 from reach.arrays import FloatArray
-from reach.grasp import Grasp
 from registration import register
 from registration.result import Registration
 
@@ -91,6 +91,11 @@ class _Attempt:
     def station(self) -> Station:
         return self.context.station
 
+    def grasps_held_alike(self, T_world_object: FloatArray) -> FloatArray:
+        """The planned grasp on the object, and as half a turn of the hand gives it (K, 4, 4)."""
+        T_world_gripper = T_world_object @ self.grasp.T_object_gripper
+        return held_alike(self.station.gripper.geometry, T_world_gripper)
+
 
 def run_take(context: TrialContext, take: Take, folder: Path) -> None:
     """Run one take of a trial up to its closed record; afterwards a label is due.
@@ -152,8 +157,8 @@ def _place(attempt: _Attempt) -> None:
         return
 
     def accept(T_world_object: FloatArray) -> bool:
-        T_world_gripper = T_world_object @ attempt.grasp.T_object_gripper
-        return can_execute(attempt.station.arm, T_world_gripper, attempt.station.config.motion)
+        grasps = attempt.grasps_held_alike(T_world_object)
+        return can_execute(attempt.station.arm, grasps, attempt.station.config.motion)
 
     rng = np.random.default_rng(attempt.seed)
     simulation.place(attempt.obj, attempt.pose, rng, accept=accept)
@@ -252,9 +257,8 @@ def _ask(attempt: _Attempt, found: Registration, recorder: TrialRecorder) -> Flo
 
 
 def _execute(attempt: _Attempt, T_world_object: FloatArray, recorder: TrialRecorder) -> Execution:
-    """Carry the planned grasp over to the registered pose, and try it."""
-    station, planned = attempt.station, Grasp(attempt.grasp.T_object_gripper)
-    T_world_gripper = T_world_object @ planned.T_object_gripper
+    """Carry the planned grasp over to the registered pose, and try it as the arm reaches it."""
+    station = attempt.station
     true_errors = _true_errors(attempt, T_world_object)
     attempt.take.advance(Phase.EXECUTE)
     watch = TrialWatch(station, recorder)
@@ -262,7 +266,7 @@ def _execute(attempt: _Attempt, T_world_object: FloatArray, recorder: TrialRecor
         execution = execute_grasp(
             station.arm,
             station.gripper,
-            T_world_gripper,
+            attempt.grasps_held_alike(T_world_object),
             station.clock,
             settings=station.config.motion,
             on_event=watch.phase,
@@ -270,7 +274,9 @@ def _execute(attempt: _Attempt, T_world_object: FloatArray, recorder: TrialRecor
         )
     except (UnreachableError, UnsafeMotionError) as error:
         raise PlacementError(f"out of reach where it lies: put it down again ({error})") from error
-    recorder.execution(mapping.execution_record(execution, T_world_object, true_errors))
+    recorder.execution(
+        mapping.execution_record(execution, T_world_object, attempt.grasp, true_errors)
+    )
     return execution
 
 

@@ -2,13 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from contextlib import suppress
 
 import numpy as np
 
 from collection.clock import Clock
-from collection.errors import CollisionStopError, GripperNotCalibratedError, RobotError
+from collection.errors import (
+    CollisionStopError,
+    GripperNotCalibratedError,
+    RobotError,
+    UnreachableError,
+    UnsafeMotionError,
+)
 from collection.robots.execution import (
     Execution,
     Phase,
@@ -45,35 +50,63 @@ def reachable_grasps(
     settings = settings or MotionSettings()
     T = np.asarray(T_world_gripper).reshape(-1, 4, 4)
     result = np.ones(len(T), dtype=bool)
-    for pose_of in (lambda each: each, approach_pose, lift_pose):
+    for pose_of in (_grasp_itself, approach_pose, lift_pose):
         open_ = np.flatnonzero(result)
         if len(open_):
-            poses = np.array([_pose(pose_of, T[n], settings) for n in open_])
+            poses = np.array([pose_of(T[n], settings) for n in open_])
             result[open_] = arm.reachable(poses)
     return result
+
+
+def _grasp_itself(T_world_gripper: FloatArray, settings: MotionSettings) -> FloatArray:
+    return T_world_gripper
 
 
 def can_execute(
     arm: Arm, T_world_gripper: FloatArray, settings: MotionSettings | None = None
 ) -> bool:
-    """Whether a trial's dry run would pass from where the arm is: what an operator wants to know."""
-    if not reachable_grasps(arm, T_world_gripper, settings)[0]:
+    """Whether a trial's dry run would pass from where the arm is: what an operator wants to know.
+
+    Arguments as for `dry_run`.
+    """
+    poses = np.asarray(T_world_gripper).reshape(-1, 4, 4)
+    within_reach = poses[reachable_grasps(arm, poses, settings)]
+    if not len(within_reach):
         return False
     try:
-        dry_run(arm, T_world_gripper, settings)
+        dry_run(arm, within_reach, settings)
     except RobotError:
         return False
     return True
 
 
-def dry_run(arm: Arm, T_world_gripper: FloatArray, settings: MotionSettings | None = None) -> None:
+def dry_run(
+    arm: Arm, T_world_gripper: FloatArray, settings: MotionSettings | None = None
+) -> FloatArray:
     """Check the whole way of a trial from where the arm is, before anything moves.
 
+    Args:
+        arm: connected.
+        T_world_gripper: the grasp, shape (4, 4), or grasps that hold alike, shape (K, 4, 4), those
+            preferred first.
+        settings: distances.
+
+    Returns:
+        The first grasp whose way is free, shape (4, 4).
+
     Raises:
-        UnreachableError: some of it is out of reach.
+        UnreachableError: some of the way is out of reach.
         UnsafeMotionError: some of it would touch the table or the robot itself.
     """
-    arm.check(trial_waypoints(T_world_gripper, settings or MotionSettings()))
+    failure: RobotError | None = None
+    for T in np.asarray(T_world_gripper).reshape(-1, 4, 4):
+        try:
+            arm.check(trial_waypoints(T, settings or MotionSettings()))
+            return frozen(T)
+        except (UnreachableError, UnsafeMotionError) as error:
+            failure = failure or error
+    assert failure is not None, "there is at least one grasp"
+    raise failure
 
 
 def execute_grasp(
@@ -91,7 +124,8 @@ def execute_grasp(
     Args:
         arm: connected and ready.
         gripper: connected.
-        T_world_gripper: the grasp, shape (4, 4).
+        T_world_gripper: the grasp, shape (4, 4), or grasps that hold alike, shape (K, 4, 4): the
+            first one in reach is executed.
         clock: of the station.
         settings: distances, speeds, force.
         on_event: called when a phase begins.
@@ -104,9 +138,7 @@ def execute_grasp(
     recorder = MotionRecorder(clock, gripper, on_event, on_sample)
     finished = False
     try:
-        execution = _run(
-            arm, gripper, frozen(T_world_gripper), settings or MotionSettings(), recorder
-        )
+        execution = _run(arm, gripper, T_world_gripper, settings or MotionSettings(), recorder)
         finished = True
     finally:
         if not finished:
@@ -157,6 +189,8 @@ def _run(
     recorder: MotionRecorder,
 ) -> Execution:
     start_ns = recorder.clock.now_ns()
+    with recorder.phase(Phase.CHECK):
+        T_world_gripper = dry_run(arm, T_world_gripper, settings)
     waypoints = {each.name: each for each in trial_waypoints(T_world_gripper, settings)}
 
     def move(name: str, speed: Speed, *, guarded: bool = False) -> None:
@@ -169,8 +203,6 @@ def _run(
             on_sample=recorder.arm_sample,
         )
 
-    with recorder.phase(Phase.CHECK):
-        arm.check(list(waypoints.values()))
     with recorder.phase(Phase.OPEN):
         gripper.open()
     with recorder.phase(Phase.AVOIDANCE):
@@ -281,9 +313,3 @@ def _put_down(arm: Arm, T: FloatArray, settings: MotionSettings, recorder: Motio
 
 def _rise(arm: Arm, T: FloatArray, speed: Speed, recorder: MotionRecorder) -> None:
     arm.move_to_pose(T, path=Path.LINEAR, speed=speed, on_sample=recorder.arm_sample)
-
-
-def _pose(
-    pose_of: Callable[..., FloatArray], T: FloatArray, settings: MotionSettings
-) -> FloatArray:
-    return pose_of(T) if pose_of.__name__ == "<lambda>" else pose_of(T, settings)
