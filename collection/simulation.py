@@ -138,7 +138,7 @@ class Simulation:
             self.hidden(obj).world,
             self.workspace.table_height,
         )
-        self._world.lock_jaws_at(self._opening)
+        self._world.lock_jaws_at(max(0.0, self._opening))
         self._world.advance(SETTLING_TIME)
         self._world.teleport(self._T_world_hand)
         self._watcher = Watcher(self._world)
@@ -236,8 +236,14 @@ class Simulation:
 
     @property
     def opening(self) -> float:
-        """True distance of the pads [m]."""
+        """True distance of the pads' undeformed faces [m]; below zero while pad presses on pad."""
         return self._world.opening if self._world else self._opening
+
+    def empty_opening(self, force: float) -> float:
+        """The true opening at which the jaws rest that close on nothing with a force [N], [m]."""
+        if self._world is None:
+            return 0.0
+        return self._world.empty_opening(force * self.hidden(self._world.object).force_factor)
 
     @property
     def jaw_speed(self) -> float:
@@ -246,12 +252,8 @@ class Simulation:
 
     @property
     def grip_force(self) -> float:
-        """True mean force on the pads [N]; an empty closed hand presses its jaws together."""
-        if self._world is None:
-            return 0.0
-        pressed = float(self._world.pad_forces.mean())
-        empty = self._jaw_force > 0 and self._world.opening < 1e-4
-        return self._jaw_force if empty else max(0.0, pressed)
+        """True mean force on the pads [N], also where they press on one another."""
+        return max(0.0, float(self._world.pad_forces.mean())) if self._world else 0.0
 
     @property
     def wrist_force(self) -> float:

@@ -26,4 +26,5 @@ def build(
     )
     context.shared["arm_model"] = planner.model
     controller = SimulatedController(simulation)
-    return SimulatedArm(planner, controller), SimulatedGripper(controller)
+    hand = SimulatedGripper(controller, context.station.motion.closing_force)
+    return SimulatedArm(planner, controller), hand

@@ -29,10 +29,13 @@ class SimulatedGripper:
 
     Args:
         controller: shared with the arm.
+        calibration_force: its width is zero where the empty jaws rest under this force [N]; by the
+            force they grip with, what they hold shows, however thin.
     """
 
-    def __init__(self, controller: SimulatedController) -> None:
+    def __init__(self, controller: SimulatedController, calibration_force: float) -> None:
         self._controller = controller
+        self._calibration_force = calibration_force
         self._simulation = controller.simulation
         self._calibrated = True
 
@@ -70,7 +73,7 @@ class SimulatedGripper:
         self._controller.require("gripper")
         start_ns = self._simulation.clock.now_ns()
         self._calibrated = True
-        self.close(0.5 * self.geometry.max_force)
+        self.close(self._calibration_force)
         done = self.open()
         return GripperMotion(start_ns, done.end_ns, done.width, done.force)
 
@@ -89,7 +92,7 @@ class SimulatedGripper:
                 f"width {width!r} m is outside 0 to {self.geometry.max_opening} m"
             )
         start_ns = self._begin()
-        closing = self._simulation.opening > target + WIDTH_TOLERANCE
+        closing = self._width() > target + WIDTH_TOLERANCE
         force = self.geometry.max_force
         self._simulation.drive_jaws(force if closing else -force)
         self._wait(lambda: self._past(target, closing=closing), on_sample)
@@ -152,10 +155,14 @@ class SimulatedGripper:
                 raise RobotTimeoutError(f"the jaws did not come to rest within {TIMEOUT} s")
 
     def _past(self, target: float, *, closing: bool) -> bool:
-        opening = self._simulation.opening
-        if closing:
-            return opening <= target
-        return opening >= target - WIDTH_TOLERANCE
+        width = self._width()
+        return width <= target if closing else width >= target - WIDTH_TOLERANCE
+
+    def _width(self) -> float:
+        """Distance of the jaws from where they rest, closed on nothing [m]; not more than open."""
+        simulation = self._simulation
+        zero = simulation.empty_opening(self._calibration_force)
+        return min(simulation.opening - zero, self.geometry.max_opening)
 
     def _done(self, start_ns: int) -> GripperMotion:
         sample = self._sample()
@@ -163,7 +170,7 @@ class SimulatedGripper:
 
     def _sample(self) -> GripperSample:
         simulation, settings = self._simulation, self._simulation.settings
-        width = simulation.opening + simulation.noise.normal(0.0, settings.width_noise)
+        width = self._width() + simulation.noise.normal(0.0, settings.width_noise)
         force = simulation.grip_force + simulation.noise.normal(0.0, settings.force_noise)
         return GripperSample(
             simulation.clock.now_ns(), max(0.0, float(width)), max(0.0, float(force))

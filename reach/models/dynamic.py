@@ -25,7 +25,7 @@ from reach.scene import Scene
 from reach.world.parameters import WorldParameters
 from reach.world.rollouts import LiftOutcomes, Outcome, simulate_grasps
 
-VERSION = "1"
+VERSION = "2"
 SAMPLES = 100
 
 

@@ -48,6 +48,8 @@ class GraspModel:
         pin_geoms: geom numbers of each jaw's pins.
         pin_qpos: positions in qpos of each jaw's pins.
         pin_stiffness: of each jaw's pins [N/m].
+        pads_stiffness: force of each jaw by how far two pads have pressed into one another [N/m];
+            zero for a hand without two facing pads.
         finger_qpos: positions in qpos of the jaws' travels.
         finger_dof: positions in qvel of the jaws' travels.
     """
@@ -61,6 +63,7 @@ class GraspModel:
     pin_geoms: tuple[IntArray, ...]
     pin_qpos: tuple[IntArray, ...]
     pin_stiffness: tuple[FloatArray, ...]
+    pads_stiffness: float
     finger_qpos: IntArray
     finger_dof: IntArray
 
@@ -154,6 +157,7 @@ def _add_hand(spec: Any, gripper: ParallelJawGripper, parameters: WorldParameter
     weld.data[10] = 1.0  # torque scale: weigh rotations as they are
     for number, jaw in enumerate(gripper.jaws):
         _add_jaw(spec, hand, number, jaw, gripper, parameters)
+    _let_pads_meet(spec, gripper, parameters)
     for number in range(1, len(gripper.jaws)):
         equal = spec.add_equality(
             name=f"travel{number}",
@@ -182,7 +186,8 @@ def _add_jaw(
         name=f"finger{number}",
         type=mujoco.mjtJoint.mjJNT_SLIDE,
         axis=closing,
-        range=[0.0, gripper.stroke],
+        # Pads stop each other, and softly: beside a thin part they press on one another.
+        range=[0.0, gripper.stroke + jaw.pad.max_deformation],
         solref_limit=CONTACT_SOLREF,
         damping=[gripper.max_force / parameters.closing_speed, 0, 0],
     )
@@ -246,6 +251,30 @@ def _add_pins(finger: Any, number: int, jaw: Jaw, parameters: WorldParameters) -
         )
 
 
+def _let_pads_meet(spec: Any, gripper: ParallelJawGripper, parameters: WorldParameters) -> None:
+    """Let two pads press on one another, as softly as on a part, where no part is between them.
+
+    The spring acts only beyond the meeting of the pads' faces. It counts the whole pad, though pins
+    that a part has pushed in do not meet: a part that lets the pads meet is small beside them.
+    """
+    stiffness = _pads_stiffness(gripper, parameters)
+    if stiffness == 0.0:
+        return
+    travels = spec.add_tendon(
+        name="pads", stiffness=[stiffness, 0, 0], springlength=[0.0, 2.0 * gripper.stroke]
+    )
+    for number in range(len(gripper.jaws)):
+        travels.wrap_joint(f"finger{number}", 1.0)
+
+
+def _pads_stiffness(gripper: ParallelJawGripper, parameters: WorldParameters) -> float:
+    """Of two pads in series [N/m]."""
+    if len(gripper.jaws) != 2:
+        return 0.0
+    area = min(jaw.pad.area for jaw in gripper.jaws)
+    return 0.5 * parameters.foundation_modulus * area
+
+
 def _indexed(model: Any, gripper: ParallelJawGripper, parameters: WorldParameters) -> GraspModel:
     names = [model.geom(i).name for i in range(model.ngeom)]
 
@@ -268,6 +297,7 @@ def _indexed(model: Any, gripper: ParallelJawGripper, parameters: WorldParameter
         pin_geoms=tuple(geoms(f"pin{k}_") for k in jaws),
         pin_qpos=tuple(frozen(model.jnt_qposadr[p], np.int64) for p in pins),
         pin_stiffness=tuple(frozen(model.jnt_stiffness[p].ravel()) for p in pins),
+        pads_stiffness=_pads_stiffness(gripper, parameters),
         finger_qpos=frozen([int(f.qposadr[0]) for f in fingers], np.int64),
         finger_dof=frozen([int(f.dofadr[0]) for f in fingers], np.int64),
     )

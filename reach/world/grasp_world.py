@@ -77,10 +77,14 @@ class GraspWorld:
 
     @property
     def opening(self) -> float:
-        """Distance of the pads' undeformed faces [m]."""
+        """Distance of the pads' undeformed faces [m]; below zero while pad presses on pad."""
         travel = float(self._data.qpos[self._built.finger_qpos].mean())
-        opening = self.gripper.max_opening - 2.0 * travel
-        return min(max(0.0, opening), self.gripper.max_opening)
+        return min(self.gripper.max_opening - 2.0 * travel, self.gripper.max_opening)
+
+    def empty_opening(self, force: float) -> float:
+        """The opening at which jaws rest that close on nothing with a force [N], [m]."""
+        stiffness = self._built.pads_stiffness
+        return -force / stiffness if stiffness else 0.0
 
     @property
     def jaw_speed(self) -> float:
@@ -89,8 +93,9 @@ class GraspWorld:
 
     @property
     def pad_forces(self) -> FloatArray:
-        """Normal force on each pad, from its springs, shape (J,) [N]."""
-        return np.array([forces.sum() for forces in self.pin_forces])
+        """Normal force on each pad, by the part and by the other pad, shape (J,) [N]."""
+        met = self._built.pads_stiffness * max(0.0, -self.opening)
+        return np.array([forces.sum() + met for forces in self.pin_forces])
 
     @property
     def pin_forces(self) -> tuple[FloatArray, ...]:

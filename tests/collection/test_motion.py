@@ -103,6 +103,19 @@ def test_a_miss_is_a_failure_not_an_error(station: Station) -> None:
     assert execution.sensor_verdict.width_closed < 1e-3
 
 
+@pytest.mark.parametrize("thickness", [0.0015, 0.003])
+def test_a_thin_part_that_is_lifted_is_seen_by_the_hand(station: Station, thickness: float) -> None:
+    """Both pads give way around it until they meet; the jaws still rest wider than on nothing."""
+    mesh = trimesh.creation.box((thickness, 0.03, 0.03))
+    plate = GraspObject("plate", mesh.vertices, mesh.faces, 0.005)
+    T = place(station, plate) @ make_transform(None, (0, 0, -0.018))  # by its rim, 7 mm deep
+    execution = run(station, np.array(T))
+    assert station.simulation is not None
+    assert station.simulation.verdict().lifted
+    assert execution.sensor_verdict.lifted
+    assert execution.sensor_verdict.width_held < thickness
+
+
 def test_a_bar_held_near_its_end_turns_and_counts_as_lifted_but_rotated() -> None:
     mesh = trimesh.creation.box((0.02, 0.10, 0.02))
     bar = GraspObject("bar", mesh.vertices, mesh.faces, 0.4)  # 157 N mm about the pads

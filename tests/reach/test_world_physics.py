@@ -122,6 +122,38 @@ def test_the_pads_give_way_by_force_over_stiffness() -> None:
     assert sunk[0] == pytest.approx(4 * sunk[1], rel=0.15)
 
 
+def test_empty_jaws_rest_where_the_pads_have_given_way_to_each_other() -> None:
+    """Two pads in series: by force over half a pad's stiffness, and the force is still felt."""
+    parameters = WorldParameters()
+    far = np.array(make_transform(None, (0.2, 0, 0))) @ from_above(0.015)
+    world = gripped(box(0.03, 0.03, 0.03, 0.01), far, parameters, force=12.0)
+    pad = YUMI.jaws[0].pad
+    expected = 12.0 / (0.5 * parameters.foundation_modulus * pad.area)
+    assert world.opening == pytest.approx(-expected, rel=0.02)
+    assert world.empty_opening(12.0) == pytest.approx(-expected)
+    np.testing.assert_allclose(world.pad_forces, 12.0, rtol=0.02)
+
+
+@pytest.mark.parametrize("thickness", [1e-3, 2e-3])
+def test_a_thin_part_keeps_the_jaws_apart(thickness: float) -> None:
+    """Held by 5 mm of its rim, both pads meet beside it, and still rest wider than on nothing.
+
+    The jaws' force is shared: E / t (A_part (thickness + overlap) / 2 + A overlap / 2) = F.
+    """
+    parameters = WorldParameters()
+    plate = box(thickness, 0.02, 0.04, 0.01)
+    rim = 5e-3
+    world = gripped(plate, from_above(0.04 - rim + 0.010), parameters)
+    covered = 0.012 * rim  # pins within the pad's tip, cut corners left out
+    modulus, area = 0.5 * parameters.foundation_modulus, YUMI.jaws[0].pad.area
+    overlap = (20.0 / modulus - covered * thickness) / (covered + area)
+    assert world.clearance > 0.09
+    assert world.opening < 0.0, "the pads meet beside the part"
+    assert world.opening - world.empty_opening(20.0) > 1e-4
+    assert -world.opening == pytest.approx(overlap, abs=1e-4)
+    np.testing.assert_allclose(world.pad_forces, 20.0, rtol=0.02)
+
+
 def test_energy_stays_bounded_while_a_part_is_held() -> None:
     world = gripped(box(0.03, 0.03, 0.03, 0.03), from_above(0.015, yaw=0.3), WorldParameters())
     energies = []

@@ -37,4 +37,5 @@ def build(config: YumiConfig, context: BuildContext) -> tuple[YumiRobotArm, Smar
 
         return ArmPlanner(yumi_arm(config.side), gripper, T_world_base, table_height)
 
-    return YumiRobotArm(link, make_planner, T_world_base), SmartGripper(link, gripper)
+    hand = SmartGripper(link, gripper, context.station.motion.closing_force)
+    return YumiRobotArm(link, make_planner, T_world_base), hand

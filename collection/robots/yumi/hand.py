@@ -19,7 +19,7 @@ from reach.gripper import ParallelJawGripper
 HOLDER = "the SmartGripper"
 JAW_TIMEOUT, CALIBRATION_TIMEOUT = 15.0, 30.0
 """The whole stroke takes 1.3 s at full speed [s]."""
-CALIBRATION_SPEED_MM, CALIBRATION_FORCE = 10.0, 10.0
+CALIBRATION_SPEED_MM = 10.0
 
 
 class SmartGripper:
@@ -31,10 +31,15 @@ class SmartGripper:
     Args:
         link: to the controller; the arm shares it.
         geometry: pads, stroke, force and solids.
+        calibration_force: its zero is where the empty jaws rest under this force [N]. With the force
+            of the grip, even a thin part shows in the width; soft pads give way by half a millimeter.
     """
 
-    def __init__(self, link: ControllerLink, geometry: ParallelJawGripper) -> None:
+    def __init__(
+        self, link: ControllerLink, geometry: ParallelJawGripper, calibration_force: float
+    ) -> None:
         self._link, self._geometry = link, geometry
+        self._calibration_force = calibration_force
         self._force = 0.0
 
     @property
@@ -77,7 +82,7 @@ class SmartGripper:
     def calibrate(self) -> GripperMotion:
         """Find the jaws' zero by closing them; nothing may be between the jaws."""
         request = Request(
-            Command.JAW_CALIBRATE, speed_mm=CALIBRATION_SPEED_MM, force=CALIBRATION_FORCE
+            Command.JAW_CALIBRATE, speed_mm=CALIBRATION_SPEED_MM, force=self._calibration_force
         )
         return self._move(request, force=0.0, timeout=CALIBRATION_TIMEOUT)
 

@@ -165,7 +165,7 @@ def test_nobody_there_is_a_lost_connection(clock: SimulatedClock) -> None:
 
 def test_commands_before_connecting_are_refused(config: YumiConfig, clock: SimulatedClock) -> None:
     with pytest.raises(NotConnectedError):
-        SmartGripper(ControllerLink(config, clock), None).read()  # type: ignore[arg-type]
+        SmartGripper(ControllerLink(config, clock), None, 20.0).read()  # type: ignore[arg-type]
 
 
 def test_a_program_stopped_at_the_pendant_is_said(
