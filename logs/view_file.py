@@ -35,7 +35,9 @@ def view_file(
     """
     import rerun as rr
 
+    _free_earlier_recordings()
     temporary = out.with_name(f".{out.name}.{os.getpid()}.part")
+    layout = temporary.with_suffix(".rbl")
     recording: Any = rr.RecordingStream(application, recording_id=recording_id)
     # Rerun's own clocks say when the view was derived, which nobody asks.
     recording.set_log_time_enabled(False)
@@ -43,10 +45,13 @@ def view_file(
     try:
         _require_room(out)
         try:
-            recording.set_sinks(rr.FileSink(str(temporary)), default_blueprint=blueprint)
+            recording.set_sinks(rr.FileSink(str(temporary)))
+            # As a file: given as `default_blueprint`, Rerun would keep it in memory for ever.
+            blueprint.save(application, str(layout))
+            recording.log_file_from_path(str(layout))
             yield recording
         finally:
-            recording.disconnect()
+            recording.disconnect()  # waits for what was still being read
         if not _is_whole(temporary):
             raise ViewError(f"cannot write the view {out}: its end is missing; is the disk full?")
         if time_ns is not None:
@@ -56,6 +61,14 @@ def view_file(
         raise ViewError(f"cannot write the view {out}: {error}") from error
     finally:
         temporary.unlink(missing_ok=True)
+        layout.unlink(missing_ok=True)
+
+
+def _free_earlier_recordings() -> None:
+    """Let go of recordings nobody holds: each would keep two threads and megabytes for ever."""
+    from rerun_bindings import flush_and_cleanup_orphaned_recordings
+
+    flush_and_cleanup_orphaned_recordings()
 
 
 def _require_room(out: Path) -> None:
