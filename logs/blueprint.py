@@ -10,15 +10,15 @@ import rerun.blueprint as rrb
 from logs import view_colors as colors
 from logs import view_panels as panels
 from logs.trial_record import TrialRecord
-from logs.view_contacts import CONTACT_ANCHOR, CONTACTS, SHOWN_CONTACTS
+from logs.view_contacts import CONTACTS, SHOWN_CONTACTS
+from logs.view_eyes import CONTACT_ANCHOR, SCENE_ANCHOR
 from logs.view_object import OBJECT, WORLD
-from logs.view_scene import SCENE_ANCHOR
 from logs.view_stage import ELAPSED
 from reach.arrays import FloatArray
 
-SCENE_EYE = np.array([0.35, -0.29, 0.20])
-"""From the object to the scene's eye: across the table, looking at hand and robot [m]."""
-CONTACT_EYE = np.array([0.062, -0.08, 0.049])
+SCENE_EYE = np.array([0.08, -0.26, 0.16])
+"""From the object to the scene's eye: before it, looking at the hand, and the robot [m]."""
+CONTACT_EYE = np.array([0.045, -0.058, 0.032])
 """From an object of unit size to the eye that looks at its contacts; see the anchor's scale."""
 
 

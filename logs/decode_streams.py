@@ -26,7 +26,7 @@ from logs.streams import (
     JawTrack,
     JointTrack,
 )
-from logs.topics import camera_of_topic
+from logs.topics import camera_of_topic, is_camera_topic
 from reach.arrays import frozen
 
 ByTopic = Mapping[str, Sequence[bytes]]
@@ -36,7 +36,7 @@ _DEPTH_TYPES = {DEPTH_METERS: "<f4", DEPTH_MILLIMETERS: "<u2"}
 
 def _of_cameras(by_topic: ByTopic, what: str) -> Iterator[tuple[str, bytes]]:
     for topic, messages in by_topic.items():
-        if topic.startswith("/camera/") and topic.endswith(f"/{what}"):
+        if is_camera_topic(topic, what):
             for data in messages:
                 if data:  # empty if the reader wanted no images
                     yield camera_of_topic(topic), data

@@ -6,7 +6,8 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from logs.errors import UnknownTrialError
-from logs.index import IndexRow, list_takes
+from logs.index import list_takes
+from logs.index_table import IndexRow
 from logs.session import SessionFolder
 
 

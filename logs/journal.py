@@ -85,7 +85,12 @@ def _decode(number: int, raw: bytes, after: int) -> JournalLine:
 
 def scan_journal(path: Path) -> JournalScan:
     """Read every line without refusing any: what recovery starts from."""
-    *complete, torn = path.read_bytes().split(b"\n")
+    return scan_lines(path.read_bytes())
+
+
+def scan_lines(content: bytes) -> JournalScan:
+    """A journal's lines, or some of them in their order, without refusing any."""
+    *complete, torn = content.split(b"\n")
     lines: list[JournalLine] = []
     after = 0
     for number, raw in enumerate(complete, start=1):

@@ -61,10 +61,12 @@ def _write(
     """Draw a record and its annotations into a file."""
     from logs.blueprint import blind_blueprint, trial_blueprint
     from logs.view_contacts import show_contacts
+    from logs.view_eyes import object_diameter, show_anchors
     from logs.view_file import view_file
-    from logs.view_object import object_diameter
+    from logs.view_object import object_triangles
     from logs.view_panels import show_panels
     from logs.view_scene import show_scene
+    from logs.view_settling import show_settling
     from logs.view_stage import Stage
 
     described = record.descriptor
@@ -76,9 +78,14 @@ def _write(
     with view_file(application, recording_id, path, layout, time_ns) as recording:
         recording.send_recording_name(_name(record, annotations))
         stage = Stage(recording, described.time_ns)
+        show_anchors(stage, record)
         show_scene(stage, record, blind=blind)
         if not blind:
-            show_contacts(stage, annotations.newest_scores, object_diameter(record))
+            scores = annotations.newest_scores
+            show_contacts(stage, scores, object_diameter(record))
+            if record.execution is not None:
+                closing_ns = record.execution.time_ns
+                show_settling(stage, scores, object_triangles(record), closing_ns)
         show_panels(stage, record, annotations, blind=blind)
 
 

@@ -5,12 +5,14 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
-from logs.index import IndexRow
-from logs.view_contacts import PREFERRED
+from logs.errors import ViewError
+from logs.index_table import IndexRow
 
 TIMELINES = ("disagreement", "trial", "by_object", "by_outcome")
 """Orders to browse in; each counts from 1."""
 PREDICTS_SUCCESS = 0.5
+JUDGES = ("settled-robust", "reach-robust", "settled", "reach")
+"""Whose disagreements come first: the first of these that scored anything, as in the report."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -20,45 +22,60 @@ class OverviewRow:
     Args:
         row: the take that counts.
         places: place in each of TIMELINES, from 1.
-        disagreement: distance of the model's score from the label, in [0, 1]; None without
-            label or score.
-        wrong: the model named the other outcome.
+        disagreement: distance of the judging model's score from the label, in [0, 1]; None
+            without label or score.
+        wrong: models that named the other outcome.
     """
 
     row: IndexRow
     places: Mapping[str, int]
     disagreement: float | None
-    wrong: bool
+    wrong: tuple[str, ...]
 
 
-def judging_model(rows: Sequence[IndexRow]) -> str | None:
-    """The model whose disagreements come first: the area contact model if it scored anything."""
+def judging_model(rows: Sequence[IndexRow], wanted: str | None = None) -> str | None:
+    """The model whose disagreements come first; None if nothing was scored.
+
+    Raises:
+        ViewError: if the wanted model scored nothing.
+    """
     models = sorted({model for row in rows for model in row.scores})
-    return PREFERRED if PREFERRED in models else next(iter(models), None)
+    if wanted is not None and wanted not in models:
+        raise ViewError(f"no trial has a score of {wanted!r}; valid: {', '.join(models) or 'none'}")
+    return next((m for m in (wanted, *JUDGES, *models) if m in models), None)
 
 
-def overview(takes: Sequence[IndexRow]) -> list[OverviewRow]:
-    """The trials that count, disagreements first."""
-    rows = [row for row in takes if row.counts and row.record != "missing"]
-    model = judging_model(rows)
+def counting(takes: Sequence[IndexRow]) -> list[IndexRow]:
+    """The takes that count and have a record."""
+    return [row for row in takes if row.counts and row.record != "missing"]
+
+
+def overview(takes: Sequence[IndexRow], model: str | None = None) -> list[OverviewRow]:
+    """The trials that count, disagreements first.
+
+    Args:
+        takes: of the session.
+        model: the judging model.
+    """
+    rows = counting(takes)
     gaps = {row.trial_id: disagreement(row, model) for row in rows}
 
-    def by_disagreement(row: IndexRow) -> tuple[float, int]:
+    def by_disagreement(row: IndexRow) -> tuple[float, float, int]:
         gap = gaps[row.trial_id]
-        return (2.0 if gap is None else -gap, row.number)
+        return (2.0 if gap is None else -gap, -_mean_disagreement(row), row.number)
 
     keys: dict[str, Callable[[IndexRow], tuple[float | str, ...]]] = {
         "disagreement": by_disagreement,
         "trial": lambda row: (row.number,),
-        "by_object": lambda row: (row.object_name, row.outcome or "~", row.number),
-        "by_outcome": lambda row: (row.outcome or "~", row.object_name, row.number),
+        "by_object": lambda row: (row.object_name, *_outcome_order(row), row.number),
+        "by_outcome": lambda row: (*_outcome_order(row), row.object_name, row.number),
     }
     places: dict[str, dict[str, int]] = {row.trial_id: {} for row in rows}
     for timeline in TIMELINES:
         for place, row in enumerate(sorted(rows, key=keys[timeline]), start=1):
             places[row.trial_id][timeline] = place
     return [
-        OverviewRow(row, places[row.trial_id], gaps[row.trial_id], _wrong(gaps[row.trial_id]))
+        OverviewRow(row, places[row.trial_id], gaps[row.trial_id], _wrong(row))
         for row in sorted(rows, key=by_disagreement)
     ]
 
@@ -71,15 +88,19 @@ def disagreement(row: IndexRow, model: str | None) -> float | None:
     return abs(value - (row.outcome == "success"))
 
 
-def _wrong(gap: float | None) -> bool:
-    return gap is not None and gap > PREDICTS_SUCCESS
+def _mean_disagreement(row: IndexRow) -> float:
+    """Of all models: among equals, what misled most of them comes first."""
+    gaps = [gap for model in row.scores if (gap := disagreement(row, model)) is not None]
+    return sum(gaps) / len(gaps) if gaps else 0.0
 
 
-def headline(shown: OverviewRow) -> str:
-    """A trial in one line."""
-    row = shown.row
-    outcome = row.outcome or "not labeled"
-    reason = f" ({row.reason.replace('_', ' ')})" if row.reason else ""
-    scores = ", ".join(f"{model} {value:.2f}" for model, value in row.scores.items())
-    mark = "disagrees: " if shown.wrong else ""
-    return f"{mark}{row.number:04d} {row.object_name}, {outcome}{reason}; {scores or 'no scores'}"
+def _outcome_order(row: IndexRow) -> tuple[str, str]:
+    return (row.outcome or "~", row.reason or "")  # not yet labeled: last
+
+
+def _wrong(row: IndexRow) -> tuple[str, ...]:
+    """A score of exactly one half names success, as everywhere."""
+    if row.outcome is None:
+        return ()
+    label = row.outcome == "success"
+    return tuple(m for m, value in row.scores.items() if (value >= PREDICTS_SUCCESS) != label)

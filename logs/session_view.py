@@ -15,39 +15,28 @@ from typing import Any
 import numpy as np
 import rerun as rr
 
-from logs import view_colors as colors
+from logs import session_blueprint as layout
 from logs.annotation_files import read_annotations
 from logs.annotations import ScoreRecord
-from logs.errors import ViewError
+from logs.errors import RecordReadError, ViewError
 from logs.index import list_takes
+from logs.record_outline import first_image, read_outline
 from logs.session import SessionFolder
-from logs.session_blueprint import (
-    CONTACTS,
-    HAND,
-    LIST,
-    OBJECTS,
-    PICTURE,
-    SCENE,
-    SCORES,
-    SUMMARY,
-    session_blueprint,
-)
-from logs.session_overview import OverviewRow, headline, judging_model, overview
-from logs.trial_record import TrialRecord, read_record
+from logs.session_overview import OverviewRow, counting, judging_model, overview
+from logs.session_poses import SessionPoses
+from logs.session_text import contents, headline
+from logs.streams import ColorImage
+from logs.trial_record import record_path
 from logs.view_contacts import (
-    FORCE_SCALE,
     PROUD,
-    highest_pressure,
+    brightest_pressure,
+    force_arrows,
     model_with_contacts,
     pressure_rgba,
 )
 from logs.view_file import view_file
-from logs.view_object import believed_pose, object_triangles
-from logs.view_robot import recorded_gripper, show_fingers
-from logs.view_stage import flat_mesh, placed
-from logs.view_text import summary
-from reach.arrays import FloatArray
-from reach.gripper import ParallelJawGripper
+from logs.view_stage import flat_mesh
+from logs.view_text import escaped, summary
 
 APPLICATION = "reach-trials session"
 PICTURES = 300
@@ -55,168 +44,140 @@ PICTURES = 300
 PICTURE_WIDTH = 400
 
 
-def write_session_view(session: Path, out: Path) -> Path:
+def write_session_view(session: Path, out: Path, model: str | None = None) -> Path:
     """Write the session's view.
 
     Args:
         session: the session's folder.
         out: the .rrd file.
+        model: whose disagreements come first; a good one if None.
 
     Raises:
         NotASessionError: if the folder is no session.
         ViewError: if there is nothing to show, or the file cannot be written.
     """
     folder = SessionFolder.open(session)
-    shown = overview(list_takes(session))
+    takes = list_takes(session)
+    judge = judging_model(counting(takes), model)
+    shown = overview(takes, judge)
     if not shown:
         raise ViewError(f"{session} has no executed trial to show yet")
-    layout = session_blueprint(judging_model([item.row for item in shown]))
-    with view_file(APPLICATION, folder.descriptor.session_id, out, layout) as recording:
-        recording.send_recording_name(f"all trials of {folder.path.resolve().name}")
-        _SessionDrawing(recording, folder, shown).draw()
+    blueprint = layout.session_blueprint(judge)
+    with view_file(APPLICATION, folder.descriptor.session_id, out, blueprint) as recording:
+        name = folder.path.resolve().name
+        recording.send_recording_name(f"all trials of {name}")
+        _SessionDrawing(recording, folder, judge).draw(shown)
+        text = rr.TextDocument(contents(name, shown, judge), media_type="text/markdown")
+        recording.log(layout.CONTENTS, text, static=True)
     return out
 
 
 class _SessionDrawing:
-    """Draws step by step; remembers which meshes it has sent."""
+    """Draws step by step what is large, and at the end, in columns, what is small."""
 
-    def __init__(self, recording: Any, folder: SessionFolder, shown: Sequence[OverviewRow]) -> None:
+    def __init__(self, recording: Any, folder: SessionFolder, judge: str | None) -> None:
         self._recording = recording
         self._folder = folder
-        self._shown = shown
-        self._objects = sorted({item.row.object_name for item in shown})
-        self._sent: set[str] = set()
-        self._gripper: ParallelJawGripper | None = None
+        self._judge = judge
+        self._poses = SessionPoses(recording)
 
-    def draw(self) -> None:
-        self._recording.log(SCENE, rr.ViewCoordinates.RIGHT_HAND_Z_UP, static=True)
-        for number, item in enumerate(self._shown):
-            record = read_record(self._folder.path / item.row.folder, images=number < PICTURES)
+    def draw(self, shown: Sequence[OverviewRow]) -> None:
+        for number, item in enumerate(shown):
             for timeline, place in item.places.items():
                 self._recording.set_time(timeline, sequence=place)
-            self._draw_trial(item, record)
+            self._draw_trial(item, picture=number < PICTURES)
         self._recording.reset_time()
+        self._poses.send([item.places for item in shown])
+        self._send_list(shown)
+        self._send_scores(shown)
 
-    def _draw_trial(self, item: OverviewRow, record: TrialRecord) -> None:
-        annotations = read_annotations(self._folder.path / item.row.folder)
-        T_scene_object = _centered(record)
-        self._draw_object(item.row.object_name, record, T_scene_object)
-        self._draw_hand(record, T_scene_object)
-        self._draw_contacts(annotations.newest_scores, T_scene_object)
-        self._draw_picture(record)
-        text = summary(record, annotations, blind=False)
-        hint = f"`reach replay {self._folder.path} --trial {item.row.number}` shows all of it."
-        self._log(SUMMARY, rr.TextDocument(f"{text}\n\n{hint}", media_type="text/markdown"))
-        level = "WARN" if item.wrong else "INFO"
-        self._log(LIST, rr.TextLog(headline(item), level=level))
-        self._draw_scores(item)
-
-    def _draw_object(self, name: str, record: TrialRecord, T_scene_object: FloatArray) -> None:
-        if name not in self._sent:
-            triangles = object_triangles(record)
-            if triangles is not None:
-                mesh = flat_mesh(triangles, colors.OBJECT_GLASS)
-                self._recording.log(f"{OBJECTS}/{name}", mesh, static=True)
-                self._sent.add(name)
-        for other in self._objects:
-            here = other == name
-            pose = rr.InstancePoses3D(
-                translations=[T_scene_object[:3, 3]],
-                mat3x3=[T_scene_object[:3, :3] * (1.0 if here else 0.0)],
+    def _draw_trial(self, item: OverviewRow, *, picture: bool) -> None:
+        folder = self._folder.path / item.row.folder
+        annotations = read_annotations(folder)
+        scores = annotations.newest_scores
+        try:
+            path = record_path(folder)
+            record = read_outline(path)
+        except RecordReadError as error:
+            self._poses.add_nothing()
+            self._draw_contacts({})
+            self._draw_picture(None)
+            self._log(
+                layout.SUMMARY, _markdown(f"### Trial {item.row.number}\n\n{escaped(str(error))}")
             )
-            self._log(f"{OBJECTS}/{other}", pose)
-
-    def _draw_hand(self, record: TrialRecord, T_scene_object: FloatArray) -> None:
-        gripper = recorded_gripper(record)
-        if gripper is not None and self._gripper is None:
-            self._gripper = gripper
-            show_fingers(self._static, HAND, gripper)
-        if self._gripper is None:
             return
-        execution = record.execution
-        grasp = execution.executed if execution else record.descriptor.planned
-        self._log(HAND, placed(T_scene_object @ grasp.T_object_gripper))
-        opening = self._gripper.max_opening if grasp.opening is None else grasp.opening
-        width = execution.measurements.get("width", opening) if execution else opening
-        travel = 0.5 * (self._gripper.max_opening - min(width, self._gripper.max_opening))
-        for number, jaw in enumerate(self._gripper.jaws):
-            moved = rr.Transform3D(translation=jaw.T_gripper_pad_open[:3, 2] * travel)
-            self._log(f"{HAND}/jaw_{number}", moved)
+        self._poses.add(item.row.object_name, path, record, scores)
+        self._draw_contacts(scores)
+        self._draw_picture(path if picture else None)
+        hint = f"`reach replay {self._folder.path} --trial {item.row.number}` shows all of it."
+        text = summary(record, annotations, blind=False)
+        self._log(layout.SUMMARY, _markdown(f"{text}\n\n{hint}"))
 
-    def _draw_contacts(self, scores: Mapping[str, ScoreRecord], T_scene_object: FloatArray) -> None:
+    def _draw_contacts(self, scores: Mapping[str, ScoreRecord]) -> None:
         model = model_with_contacts(dict(scores))
         if model is None:
-            self._log(CONTACTS, rr.Clear(recursive=True))
+            self._log(layout.CONTACTS, rr.Clear(recursive=True))
             return
         score = scores[model]
-        highest = highest_pressure(score)
+        highest = brightest_pressure(score)
         patches = [patch for patch in score.patches if len(patch.triangles_object)]
-        self._log(CONTACTS, placed(T_scene_object))
-        lifted = [p.triangles_object - PROUD * p.normal_object for p in patches]
-        shades = [pressure_rgba(patch, highest) for patch in patches]
         if patches:
+            lifted = [p.triangles_object - PROUD * p.normal_object for p in patches]
+            shades = [pressure_rgba(patch, highest) for patch in patches]
             mesh = flat_mesh(np.concatenate(lifted), None, np.concatenate(shades))
-            self._log(f"{CONTACTS}/pressure", mesh)
-        vectors = np.array([patch.force_object for patch in score.patches]) * FORCE_SCALE
-        ends = np.array([patch.center_object for patch in score.patches])
-        arrows = rr.Arrows3D(
-            origins=ends - vectors, vectors=vectors, colors=[colors.FORCE], radii=[0.0011]
-        )
-        self._log(f"{CONTACTS}/force", arrows)
-
-    def _draw_picture(self, record: TrialRecord) -> None:
-        picture = _picture(record)
-        if picture is None:
-            self._log(PICTURE, rr.Clear(recursive=False))
+            self._log(f"{layout.CONTACTS}/pressure", mesh)
         else:
-            self._log(PICTURE, rr.EncodedImage(contents=picture, media_type="image/jpeg"))
+            self._log(f"{layout.CONTACTS}/pressure", rr.Clear(recursive=False))
+        self._log(f"{layout.CONTACTS}/force", force_arrows(score.patches, self._poses.diameter))
 
-    def _draw_scores(self, item: OverviewRow) -> None:
-        for model, value in item.row.scores.items():
-            self._log(f"{SCORES}/{model}", rr.Scalars(value))
-        if item.row.outcome is not None:
-            self._log(f"{SCORES}/label", rr.Scalars(float(item.row.outcome == "success")))
+    def _draw_picture(self, path: Path | None) -> None:
+        picture = _picture(path) if path else None
+        if picture is None:
+            self._log(layout.PICTURE, rr.Clear(recursive=False))
+        else:
+            self._log(layout.PICTURE, rr.EncodedImage(contents=picture, media_type="image/jpeg"))
+
+    def _send_list(self, shown: Sequence[OverviewRow]) -> None:
+        texts = [headline(item, self._judge) for item in shown]
+        levels = ["WARN" if self._judge in item.wrong else "INFO" for item in shown]
+        self._send(layout.LIST, shown, rr.TextLog.columns(text=texts, level=levels))
+
+    def _send_scores(self, shown: Sequence[OverviewRow]) -> None:
+        labeled = [item for item in shown if item.row.outcome is not None]
+        values = [float(item.row.outcome == "success") for item in labeled]
+        self._send(f"{layout.SCORES}/label", labeled, rr.Scalars.columns(scalars=values))
+        for model in sorted({model for item in shown for model in item.row.scores}):
+            scored = [item for item in shown if model in item.row.scores]
+            values = [item.row.scores[model] for item in scored]
+            self._send(f"{layout.SCORES}/{model}", scored, rr.Scalars.columns(scalars=values))
+
+    def _send(self, entity: str, shown: Sequence[OverviewRow], columns: Any) -> None:
+        if shown:
+            steps = layout.time_columns([item.places for item in shown])
+            self._recording.send_columns(entity, indexes=steps, columns=columns)
 
     def _log(self, entity: str, what: Any) -> None:
         self._recording.log(entity, what)
 
-    def _static(self, entity: str, *what: Any) -> None:
-        self._recording.log(entity, *what, static=True)
+
+def _markdown(text: str) -> Any:
+    return rr.TextDocument(text, media_type="text/markdown")
 
 
-def _centered(record: TrialRecord) -> FloatArray:
-    """The object as it was found, moved to the scene's middle so that all trials look alike.
-
-    It is turned about the vertical: every hand closes along the scene's x axis, and stands
-    beyond the object, seen from the eye.
-    """
-    T = np.array(believed_pose(record))
-    execution = record.execution
-    grasp = execution.executed if execution else record.descriptor.planned
-    closing, approach = (T @ grasp.T_object_gripper)[:2, [0, 2]].T
-    if closing[0] * approach[1] - closing[1] * approach[0] > 0:
-        closing = -closing
-    length = np.hypot(*closing)
-    c, s = closing / length if length > 0 else (1.0, 0.0)
-    turn = np.array([(c, s, 0.0), (-s, c, 0.0), (0.0, 0.0, 1.0)])
-    T[:3, :3] = turn @ T[:3, :3]
-    T[:2, 3] = 0.0
-    return T
-
-
-def _picture(record: TrialRecord) -> bytes | None:
-    """A small color frame, or the depth image in gray."""
+def _picture(path: Path) -> bytes | None:
+    """A record's first color frame, small, or its depth image in gray, as JPEG."""
     from PIL import Image
 
-    if record.color:
-        image = Image.fromarray(record.color[0].pixels())
-    elif record.depth:
-        depth = record.depth[0].meters()
+    found = first_image(path)
+    if found is None:
+        return None
+    if isinstance(found, ColorImage):
+        image = Image.fromarray(found.pixels())
+    else:
+        depth = found.meters()
         near, far = np.nanpercentile(depth, [2, 98]) if np.isfinite(depth).any() else (0.0, 1.0)
         shade = np.nan_to_num((far - depth) / max(far - near, 1e-6), nan=0.0).clip(0, 1)
         image = Image.fromarray((shade * 255).astype(np.uint8), "L")
-    else:
-        return None
     image.thumbnail((PICTURE_WIDTH, PICTURE_WIDTH))
     buffer = io.BytesIO()
     image.save(buffer, "jpeg", quality=85)

@@ -68,6 +68,12 @@ def camera_topic(camera: str, what: str) -> str:
     return f"/camera/{camera}/{what}"
 
 
+def is_camera_topic(topic: str, what: str) -> bool:
+    """Whether a channel is that one of some camera."""
+    pieces = topic.split("/")
+    return len(pieces) == 4 and pieces[1] == "camera" and pieces[3] == what
+
+
 def camera_of_topic(topic: str) -> str:
     """Name of the camera whose channel this is."""
     return topic.split("/")[2]

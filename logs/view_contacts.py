@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 import rerun as rr
 
@@ -13,14 +15,14 @@ from logs.view_stage import Stage, flat_mesh
 CONTACTS = f"{OBJECT}/contacts"
 SHOWN_CONTACTS = f"{CONTACTS}/shown"
 """Contacts of the model that the view shows first."""
-CONTACT_ANCHOR = f"{OBJECT}/eye"
-"""From here the contacts are looked at: scaled so that every object looks as large."""
-UNIT_DIAMETER = 0.052
-"""Diagonal that an object seems to have in the anchor's frame [m]."""
 PROUD = 2e-4
 """Patches stand off the surface by this, so that they are not drawn inside it [m]."""
-FORCE_SCALE = 0.002
-"""Length of a force arrow [m/N]."""
+ARROW_LENGTH = 0.02
+"""Length of a force arrow in diameters of the object [1/N]."""
+ARROW_RADIUS = 0.012
+"""Of a force arrow, in diameters of the object."""
+BRIGHT_SHARE = 95
+"""Percentile of the pressures from which on all is yellow."""
 PREFERRED = "reach"
 
 
@@ -33,12 +35,11 @@ def show_contacts(stage: Stage, scores: dict[str, ScoreRecord], diameter: float)
         diameter: of the object [m].
     """
     first = model_with_contacts(scores)
-    stage.static(CONTACT_ANCHOR, rr.Transform3D(scale=diameter / UNIT_DIAMETER))
     for model, score in scores.items():
-        highest = highest_pressure(score)
+        highest = brightest_pressure(score)
         entity = SHOWN_CONTACTS if model == first else f"{CONTACTS}/others/{model}"
         for number, patch in enumerate(score.patches):
-            _show_patch(stage, f"{entity}/jaw_{patch.jaw}_{number}", patch, highest)
+            _show_patch(stage, f"{entity}/jaw_{patch.jaw}_{number}", patch, highest, diameter)
 
 
 def model_with_contacts(scores: dict[str, ScoreRecord]) -> str | None:
@@ -48,27 +49,46 @@ def model_with_contacts(scores: dict[str, ScoreRecord]) -> str | None:
 
 
 def highest_pressure(score: ScoreRecord) -> float:
-    """The scale's upper end [Pa]."""
+    """Peak of all patches [Pa]."""
     peaks = [float(p.pressures.max()) for p in score.patches if p.pressures.size]
     return max(peaks, default=0.0)
 
 
-def _show_patch(stage: Stage, entity: str, patch: PatchRecord, highest: float) -> None:
+def brightest_pressure(score: ScoreRecord) -> float:
+    """The color scale's upper end [Pa]: a single sharp edge shall not darken all the rest."""
+    known = [patch.pressures.ravel() for patch in score.patches if patch.pressures.size]
+    return float(np.percentile(np.concatenate(known), BRIGHT_SHARE)) if known else 0.0
+
+
+def _show_patch(
+    stage: Stage, entity: str, patch: PatchRecord, highest: float, diameter: float
+) -> None:
     if len(patch.triangles_object):
         lifted = patch.triangles_object - PROUD * patch.normal_object
         shades = pressure_rgba(patch, highest)
         stage.static(f"{entity}/pressure", flat_mesh(lifted, None, shades))
-    magnitude = float(np.linalg.norm(patch.force_object))
-    vector = patch.force_object * FORCE_SCALE
-    stage.static(
-        f"{entity}/force",
-        rr.Arrows3D(
-            origins=[patch.center_object - vector],
-            vectors=[vector],
-            colors=[colors.FORCE],
-            radii=[0.0011],
-            labels=[f"{magnitude:.1f} N"],
-        ),
+    label = f"{np.linalg.norm(patch.force_object):.1f} N"
+    stage.static(f"{entity}/force", force_arrows([patch], diameter, labels=[label]))
+
+
+def force_arrows(
+    patches: Sequence[PatchRecord], diameter: float, labels: Sequence[str] | None = None
+) -> rr.Arrows3D:
+    """Arrows that end at the patches, as long as the forces are large beside the object.
+
+    Args:
+        patches: where the forces act.
+        diameter: of the object [m].
+        labels: of the arrows.
+    """
+    vectors = np.array([p.force_object for p in patches]).reshape(-1, 3) * ARROW_LENGTH * diameter
+    ends = np.array([p.center_object for p in patches]).reshape(-1, 3)
+    return rr.Arrows3D(
+        origins=ends - vectors,
+        vectors=vectors,
+        colors=[colors.FORCE],
+        radii=[ARROW_RADIUS * diameter],
+        labels=labels,
     )
 
 

@@ -50,12 +50,6 @@ def object_triangles(record: TrialRecord) -> FloatArray | None:
     return vertices[faces]
 
 
-def object_diameter(record: TrialRecord) -> float:
-    """Diagonal of the object's bounding box [m]; a plausible one if no mesh is attached."""
-    triangles = object_triangles(record)
-    return 0.05 if triangles is None else float(np.linalg.norm(np.ptp(triangles, axis=(0, 1))))
-
-
 def believed_pose(record: TrialRecord) -> FloatArray:
     """T_world_object as it was found, or as it was planned if it was not, shape (4, 4)."""
     found = record.registration

@@ -17,8 +17,6 @@ from logs.view_stage import Stage, placed
 from reach.arrays import FloatArray
 from reach.transforms import make_transform
 
-SCENE_ANCHOR = f"{WORLD}/eye"
-"""From here the scene is looked at: where the object was found."""
 CLOUD_POINTS = 60_000
 """More points make the viewer slow and the picture no clearer."""
 TABLE_SIZE = 0.8
@@ -27,7 +25,6 @@ TABLE_SIZE = 0.8
 def show_scene(stage: Stage, record: TrialRecord, *, blind: bool) -> None:
     """Draw everything that stands or moves in the world."""
     stage.static(WORLD, rr.ViewCoordinates.RIGHT_HAND_Z_UP)
-    stage.static(SCENE_ANCHOR, rr.Transform3D(translation=believed_pose(record)[:3, 3]))
     _show_table(stage, record)
     gripper = recorded_gripper(record)
     if GRIPPER_FRAME not in record.frames:

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+import json
 
 import numpy as np
 
 from logs.annotations import Annotations, LabelRecord, ScoreRecord
 from logs.trial_record import TrialRecord
-from logs.view_contacts import PREFERRED, highest_pressure
+from logs.view_contacts import PREFERRED, brightest_pressure, highest_pressure
 
 DISAGREES = 0.5
 """A model predicts success from this score on."""
@@ -18,14 +18,14 @@ def summary(record: TrialRecord, annotations: Annotations, *, blind: bool) -> st
     """What happened and what was predicted; a blind one tells only what was asked for."""
     described = record.descriptor
     take = f", take {described.take}" if described.take > 1 else ""
-    parts = [f"# Trial {described.number}: {described.object_name}{take}"]
+    parts = [f"### Trial {described.number}: {described.object_name}{take}"]
+    if record.damage:
+        parts.append(f"**Damaged record, only its beginning is shown:** {escaped(record.damage)}")
     if not blind:
         parts += [_verdict(annotations.label), _scores(annotations)]
     parts += [_grasp(record, blind=blind), _registration(record), _origin(record)]
-    if record.damage:
-        parts.insert(
-            1, f"**Damaged record, only its beginning is shown:** {escaped(record.damage)}"
-        )
+    if not blind:
+        parts.append(_models(annotations))
     return "\n\n".join(part for part in parts if part)
 
 
@@ -60,33 +60,58 @@ def _verdict(label: LabelRecord | None) -> str:
 
 
 def _scores(annotations: Annotations) -> str:
-    scores = annotations.newest_scores
+    scores = _ordered(annotations)
     if not scores:
         return ""
-    scores = dict(sorted(scores.items(), key=lambda item: (item[0] != PREFERRED, item[0])))
     label = annotations.label
-    lines = ["## Scores", "| model | predicts | |", "|---|---|---|"]
-    for model, score in scores.items():
+    lines = ["| model | predicts | |", "|---|---|---|"]
+    for score in scores:
         mark = "" if label is None else ("agrees" if agrees(score, label) else "**disagrees**")
-        lines.append(f"| {escaped(model)} {escaped(score.version)} | {score.value:.2f} | {mark} |")
-    for score in scores.values():
-        lines += _explained(score)
-    return "\n".join(lines)
+        lines.append(f"| {escaped(score.model)} | {score.value:.2f} | {mark} |")
+    told = [f"- *{escaped(s.model)}:* {'; '.join(words)}" for s in scores if (words := _said(s))]
+    return "\n".join([*lines, "", *told])
 
 
-def _explained(score: ScoreRecord) -> Iterable[str]:
-    told = [escaped(score.explanation)] if score.explanation else []
+def _ordered(annotations: Annotations) -> list[ScoreRecord]:
+    """Newest scores, that of the model whose contacts are shown first."""
+    scores = annotations.newest_scores.values()
+    return sorted(scores, key=lambda score: (score.model != PREFERRED, score.model))
+
+
+def _said(score: ScoreRecord) -> list[str]:
+    """What a model gives as its reason."""
+    told = [score.explanation] if score.explanation else []
+    try:
+        longer = json.loads(score.texts.get("explanation", '""'))
+    except ValueError:
+        longer = ""
+    if isinstance(longer, str) and longer:
+        told = [longer]
     if score.patches:
         area = sum(patch.area for patch in score.patches) * 1e6
-        told.append(f"contact {area:.0f} mm², up to {highest_pressure(score) / 1e3:.0f} kPa")
-    told += [f"{escaped(name)} {escaped(value)}" for name, value in score.parameters.items()]
-    told += [f"{escaped(name)} {value:.3g}" for name, value in score.details.items()]
-    return ["", f"*{escaped(score.model)}:* {'; '.join(told)}"] if told else []
+        peak, bright = highest_pressure(score) / 1e3, brightest_pressure(score) / 1e3
+        told.append(f"contact {area:.0f} mm², up to {peak:.0f} kPa (yellow from {bright:.0f})")
+    return [escaped(text) for text in told]
+
+
+def _models(annotations: Annotations) -> str:
+    """With which parameters the models were asked, and the numbers they gave."""
+    lines = []
+    for score in _ordered(annotations):
+        numbers = [f"{escaped(name)} {value:.3g}" for name, value in sorted(score.details.items())]
+        numbers += [f"{escaped(k)} {escaped(v)}" for k, v in sorted(score.parameters.items())]
+        name = f"{escaped(score.model)}, version {escaped(score.version)}"
+        lines.append(f"- *{name}:* {', '.join(numbers)}")
+    return "\n".join(["**Models**", "", *lines]) if lines else ""
 
 
 def _grasp(record: TrialRecord, *, blind: bool) -> str:
     planned = record.descriptor.planned
-    lines = ["## Grasp", f"- planned: {escaped(record.descriptor.grasp_id)}, {planned.force:g} N"]
+    lines = [
+        "**Grasp**",
+        "",
+        f"- planned: {escaped(record.descriptor.grasp_id)}, {planned.force:g} N",
+    ]
     execution = record.execution
     if execution is not None:
         offset = execution.T_world_gripper[:3, 3] - execution.T_world_gripper_commanded[:3, 3]
@@ -106,10 +131,11 @@ def _grasp(record: TrialRecord, *, blind: bool) -> str:
 def _registration(record: TrialRecord) -> str:
     found = record.registration
     if found is None:
-        return "## Pose\nnot found"
+        return "**Pose:** not found"
     spread = np.sqrt(np.diag(found.covariance))
     lines = [
-        "## Pose",
+        "**Pose**",
+        "",
         f"- one sigma {np.linalg.norm(spread[3:]) * 1e3:.2f} mm,"
         f" {np.degrees(np.linalg.norm(spread[:3])):.2f}°",
         f"- stable pose {found.stable_pose} (declared {record.descriptor.stable_pose})",
@@ -129,7 +155,7 @@ def _origin(record: TrialRecord) -> str:
     station = "simulated station" if described.simulated else "real station"
     versions = ", ".join(f"{escaped(k)} {escaped(v)}" for k, v in described.versions.items())
     return (
-        f"## Origin\n- {station}, seed {described.seed}\n- trial `{described.trial_id}`\n"
+        f"**Origin**\n\n- {station}, seed {described.seed}\n- trial `{described.trial_id}`\n"
         f"- mass {described.object_mass * 1e3:.1f} g, gripper {escaped(described.gripper_name)}"
         + (f"\n- {versions}" if versions else "")
     )

@@ -24,6 +24,12 @@ def replay(
         Path | None, typer.Option(help="Write the recording to this .rrd file.")
     ] = None,
     no_viewer: Annotated[bool, typer.Option("--no-viewer", help="Open no window.")] = False,
+    web: Annotated[
+        bool, typer.Option("--web", help="Serve it to a browser, for work over SSH.")
+    ] = False,
+    model: Annotated[
+        str | None, typer.Option(help="Whose disagreements with the labels come first.")
+    ] = None,
     blind: Annotated[
         bool, typer.Option("--blind", help="Hide label, scores and contacts; needs --trial.")
     ] = False,
@@ -35,6 +41,8 @@ def replay(
 
     - `reach replay sessions/monday`
     - `reach replay sessions/monday --trial 7`
+    - `reach replay sessions/monday --model reach-robust`
+    - `reach replay sessions/monday --web`
     - `reach replay sessions/monday --save monday.rrd --no-viewer`
     """
     from logs.errors import ViewError
@@ -42,13 +50,19 @@ def replay(
 
     if blind and trial is None:
         raise ViewError("--blind hides what the overview is about; choose one trial with --trial")
+    if model is not None and trial is not None:
+        raise ViewError("--model orders the overview; it says nothing of one trial (--trial)")
+    if web and no_viewer:
+        raise ViewError("--web opens the viewer in a browser, --no-viewer opens none; choose one")
     if save is not None and save.suffix != ".rrd":
         raise ViewError(f"--save {save}: a recording's name ends in .rrd")
-    shown = _session(session) if trial is None else [_trial(session, trial, blind=blind)]
+    shown = _session(session, model) if trial is None else [_trial(session, trial, blind=blind)]
     if save is not None:
         _copy(shown[0], save)
         print(save)
-    if not no_viewer:
+    if web:
+        _serve(shown)
+    elif not no_viewer:
         show_recordings(shown)
     elif save is None:
         print(shown[0])
@@ -61,18 +75,19 @@ def _trial(session: Path, wanted: str, *, blind: bool) -> Path:
     return fresh_view(find_take(session, wanted), blind=blind)
 
 
-def _session(session: Path) -> list[Path]:
+def _session(session: Path, model: str | None) -> list[Path]:
     """The overview, and the full views of the worst disagreements; all views are made fresh."""
     from logs.index import list_takes
     from logs.rerun_view import view_path
-    from logs.session_overview import overview
+    from logs.session_overview import counting, judging_model, overview
     from logs.session_view import write_session_view
 
     rows = list_takes(session)
+    judge = judging_model(counting(rows), model)
     folders = [session / row.folder for row in rows if row.record in ("complete", "damaged")]
     made = set(_fresh_views(folders))
-    first = write_session_view(session, session / SESSION_VIEW)
-    worst = [view_path(session / item.row.folder) for item in overview(rows)]
+    first = write_session_view(session, session / SESSION_VIEW, judge)
+    worst = [view_path(session / item.row.folder) for item in overview(rows, judge)]
     return [first, *[path for path in worst if path in made][:OPENED_WITH_SESSION]]
 
 
@@ -91,6 +106,23 @@ def _fresh_views(folders: Sequence[Path]) -> Iterator[Path]:
             yield fresh_view(folder)
         except RecordError as error:
             print(f"{folder.name} cannot be shown: {error}", file=sys.stderr)
+
+
+def _serve(shown: Sequence[Path]) -> None:
+    """Serve recordings to a browser until Ctrl-C, or until the SSH session is closed."""
+    import os
+    import signal
+
+    from logs.viewer import WebViewer
+
+    for ending in (signal.SIGTERM, signal.SIGHUP):
+        signal.signal(ending, signal.default_int_handler)  # so that the server ends with us
+    with WebViewer(shown) as viewer:
+        address = viewer.address
+        print(f"open {address.link}")
+        print(f"from another machine, first: {address.tunnel(os.environ)}")
+        print("end with Ctrl-C", flush=True)
+        viewer.wait()
 
 
 def _copy(view: Path, out: Path) -> None:

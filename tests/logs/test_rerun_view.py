@@ -1,5 +1,6 @@
 """The view is derived from record and annotations alone, at any time again."""
 
+import json
 import os
 import shutil
 import subprocess
@@ -13,17 +14,13 @@ import pytest
 from logs.annotation_files import write_annotation
 from logs.annotations import LabelRecord, ScoreRecord
 from logs.descriptions import robot_attachment
-from logs.errors import RecordReadError, UnknownTrialError, ViewError
-from logs.find_trial import find_take
-from logs.index import list_takes
+from logs.errors import RecordReadError, ViewError
 from logs.recorder import TrialRecorder
 from logs.records import ExitStatus
 from logs.rerun_view import derive_rrd, fresh_view, view_path
-from logs.session import SessionFolder
-from logs.session_overview import TIMELINES, overview
-from logs.session_view import write_session_view
 from logs.trial_record import read_record
 from logs.view_colors import pressure_colors
+from logs.view_eyes import turned_to_hand
 from logs.view_object import object_track
 from logs.view_text import summary
 from reach.transforms import exp
@@ -84,7 +81,71 @@ def test_everything_of_the_trial_is_shown(take: Path) -> None:
         assert words in text.replace("\\\\", "\\"), words
 
 
-def test_a_blind_view_holds_no_prediction_and_no_verdict(take: Path) -> None:
+def ghosts(view: Path) -> dict[str, list[tuple[float, np.ndarray]]]:
+    """Per entity of the predicted settling: when it appears [s], and its poses (N, 3)."""
+    from rerun.chunk import RrdReader
+
+    found: dict[str, list[tuple[float, np.ndarray]]] = {}
+    for chunk in RrdReader(str(view)).stream():
+        entity, batch = str(chunk.entity_path), chunk.to_record_batch()
+        if "predicted_settling" in entity and "InstancePoses3D:translations" in batch.schema.names:
+            when = batch.column("elapsed")[0].as_py().total_seconds()
+            places = np.array(batch.column("InstancePoses3D:translations")[0].as_py())
+            found.setdefault(entity, []).append((when, places))
+    return found
+
+
+def settled_score(made: ModuleType, path: object) -> ScoreRecord:
+    return ScoreRecord(
+        made.TRIAL_ID, 1, made.START_NS, "30", 30, "settled", "1", 1.0,
+        texts={"path": json.dumps(path), "explanation": '"settles by 20 mm"'},
+    )  # fmt: skip
+
+
+def test_ghosts_show_how_the_part_settles_once_the_jaws_close(made, take: Path) -> None:
+    write_annotation(take, settled_score(made, made.settling()))
+    drawn = ghosts(derive_rrd(take))
+    assert set(drawn) == {
+        "/world/predicted_settling/settled/way",
+        "/world/predicted_settling/settled/settled",
+    }
+    record = read_record(take)
+    closing = (record.execution.time_ns - record.descriptor.time_ns) / 1e9
+    ((when, way),) = drawn["/world/predicted_settling/settled/way"]
+    ((_, settled),) = drawn["/world/predicted_settling/settled/settled"]
+    assert when == pytest.approx(closing) and 3 <= len(way) <= 5
+    assert np.allclose(settled, [np.array(made.settling())[-1, :3, 3]], atol=1e-6)
+    assert np.all(np.diff(way[:, 1]) > 0.003)  # apart from one another, along the way
+    assert "settles by 20 mm" in read_view(derive_rrd(take))[1]
+
+
+@pytest.mark.parametrize("path", [[], [[1.0, 2.0]], "north", [np.eye(3).tolist()], {"a": 1}])
+def test_a_path_that_is_none_draws_no_ghost(made, take: Path, path: object) -> None:
+    write_annotation(take, settled_score(made, path))
+    assert ghosts(derive_rrd(take)) == {}
+
+
+def test_a_part_that_stays_where_it_is_has_no_ghost(made, take: Path) -> None:
+    write_annotation(take, settled_score(made, made.settling(way=0.0003, steps=1) * 12))
+    assert ghosts(derive_rrd(take)) == {}
+
+
+def test_the_eye_sees_the_hand_from_before_it(made) -> None:
+    """However the hand stands, it closes along x, and is beyond the object or above it."""
+    randomly = np.random.default_rng(3)
+    for _ in range(50):
+        T_world_gripper = exp(randomly.normal(size=6))
+        turned = turned_to_hand(T_world_gripper) @ T_world_gripper[:3, :3]
+        assert abs(turned[1, 0]) < 1e-9 and turned[1, 2] <= 1e-9
+    upright = np.diag([1.0, -1.0, -1.0, 1.0])  # from above: the robot's side decides
+    assert np.allclose(turned_to_hand(upright, np.array([0.0, 1.0])), np.eye(3))
+    assert np.allclose(turned_to_hand(upright, np.array([0.0, -1.0])), np.diag([-1, -1, 1]))
+    sideways = exp([0, np.pi / 2, 0, 0, 0, 0])  # closes along the vertical
+    assert np.allclose(turned_to_hand(sideways), turned_to_hand(sideways).round())
+
+
+def test_a_blind_view_holds_no_prediction_and_no_verdict(made, take: Path) -> None:
+    write_annotation(take, settled_score(made, made.settling()))
     path = derive_rrd(take, blind=True)
     assert path == view_path(take, blind=True) and not view_path(take).exists()
     entities, text = read_view(path)
@@ -92,7 +153,7 @@ def test_a_blind_view_holds_no_prediction_and_no_verdict(take: Path) -> None:
     assert not any("contacts" in entity or "truth" in entity for entity in entities)
     for words in ("success", "0.81", "reach", "held", "sensors", "ada", "kPa"):
         assert words not in text.replace("reach-trials", "").replace("held: width", ""), words
-    assert b"contacts" not in path.read_bytes()
+    assert b"contacts" not in path.read_bytes() and b"settling" not in path.read_bytes()
 
 
 def test_the_record_is_never_touched_and_views_are_rebuilt(made, take: Path) -> None:
@@ -191,106 +252,6 @@ def test_the_pressure_scale_rises_from_violet_to_yellow() -> None:
     luminance = pressure_colors(np.linspace(0, 1, 50), 1.0) @ [0.2126, 0.7152, 0.0722]
     assert np.all(np.diff(luminance) >= -1)
     assert pressure_colors(np.zeros((2, 3)), 0.0).shape == (2, 3, 3)
-
-
-# ---- the session -----------------------------------------------------------------------------
-
-
-@pytest.fixture(scope="module")
-def session(sessions, tmp_path_factory) -> SessionFolder:
-    return sessions.build_session(tmp_path_factory.mktemp("s") / "session", 5, samples=3)
-
-
-def test_disagreements_come_first(session: SessionFolder) -> None:
-    shown = overview(list_takes(session.path))
-    gaps = [item.disagreement for item in shown]
-    assert gaps == sorted(gaps, reverse=True) and shown[0].wrong and not shown[-1].wrong
-    assert [item.places["disagreement"] for item in shown] == [1, 2, 3, 4, 5]
-    for timeline in TIMELINES:
-        assert sorted(item.places[timeline] for item in shown) == [1, 2, 3, 4, 5]
-    by_outcome = sorted(shown, key=lambda item: item.places["by_outcome"])
-    assert [item.row.outcome for item in by_outcome] == ["failure"] + ["success"] * 4
-
-
-def test_all_trials_are_in_one_recording(session: SessionFolder, tmp_path: Path) -> None:
-    from rerun.chunk import RrdReader
-
-    path = write_session_view(session.path, tmp_path / "all.rrd")
-    entities, text = read_view(path)
-    assert {
-        "/scene/objects/cube_3cm",
-        "/scene/objects/bracket",
-        "/scene/hand",
-        "/picture",
-    } <= entities
-    for number in range(1, 6):
-        assert f"{number:04d} " in text and f"Trial {number}:" in text
-    assert text.count("disagrees: ") == sum(
-        item.wrong for item in overview(list_takes(session.path))
-    )
-    steps = {
-        name: set(batch.column(name).to_pylist())
-        for chunk in RrdReader(str(path)).stream()
-        if str(chunk.entity_path) == "/summary"
-        for batch in [chunk.to_record_batch()]
-        for name in TIMELINES
-    }
-    assert all(found == {1, 2, 3, 4, 5} for found in steps.values()) and len(steps) == 4
-
-
-def test_a_session_without_trials_says_so(sessions, tmp_path: Path) -> None:
-    folder = sessions.make_session(tmp_path / "s", 2)
-    with pytest.raises(ViewError, match="no executed trial"):
-        write_session_view(folder.path, tmp_path / "all.rrd")
-
-
-def test_a_trial_is_found_by_number_id_and_beginning(session: SessionFolder) -> None:
-    second = session.descriptor.trials[1].trial_id
-    expected = session.trial_folder(second)
-    assert find_take(session.path, "2") == expected
-    assert find_take(session.path, second) == expected
-    assert find_take(session.path, second[:13]) == expected
-
-
-@pytest.mark.parametrize("wanted", ["99", "", "zzz", "0"])
-def test_an_unknown_trial_is_one_clear_error(session: SessionFolder, wanted: str) -> None:
-    with pytest.raises(UnknownTrialError, match=r"valid: a number from 1 to 6") as raised:
-        find_take(session.path, wanted)
-    assert "\n" not in str(raised.value)
-
-
-def test_a_trial_without_record_is_one_clear_error(session: SessionFolder) -> None:
-    with pytest.raises(UnknownTrialError, match="trial 6 .* has no record yet"):
-        find_take(session.path, "6")
-
-
-def test_replay_rebuilds_all_views(session: SessionFolder, tmp_path: Path, capsys) -> None:
-    from collection.cli.replay import replay
-
-    for path in session.path.rglob("*.rrd"):
-        path.unlink()
-    replay(session.path, save=tmp_path / "out.rrd", no_viewer=True)
-    assert capsys.readouterr().out.strip() == str(tmp_path / "out.rrd")
-    assert (tmp_path / "out.rrd").stat().st_size > 10_000
-    assert len(list(session.path.glob("trials/*/trial.rrd"))) == 5
-    replay(session.path, trial="3", blind=True, no_viewer=True)
-    shown = Path(capsys.readouterr().out.strip())
-    assert shown.name == "trial.blind.rrd" and shown.parent.name.startswith("0003_")
-
-
-def test_replay_refuses_what_makes_no_sense(
-    session: SessionFolder, tmp_path: Path, monkeypatch
-) -> None:
-    from collection.cli.replay import replay
-
-    with pytest.raises(ViewError, match="--trial"):
-        replay(session.path, blind=True, no_viewer=True)
-    with pytest.raises(ViewError, match=r"ends in \.rrd"):
-        replay(session.path, trial="1", save=tmp_path / "out.mp4", no_viewer=True)
-    monkeypatch.delenv("DISPLAY", raising=False)
-    monkeypatch.delenv("WAYLAND_DISPLAY", raising=False)
-    with pytest.raises(ViewError, match="no screen"):
-        replay(session.path, trial="1")
 
 
 def test_free_text_cannot_break_the_panel(made, tmp_path: Path) -> None:
