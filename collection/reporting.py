@@ -56,7 +56,7 @@ def write_report(
     Raises:
         InvalidInputError: the page cannot be written.
     """
-    from collection.cli.evaluate import chosen_pose_error
+    from collection.evaluating import chosen_pose_error
     from logs.dataset_sources import load_labeled
     from logs.report.page import build_report
     from reach.evaluation.backends import cluster

@@ -18,6 +18,7 @@ from logs.errors import RecordReadError
 from logs.mesh_attachment import OBJECT_MESH, read_mesh
 from logs.trial_record import TrialRecord, read_record
 from reach.arrays import FloatArray
+from reach.evaluation.scored import used_parameters
 from reach.grasp import Grasp
 from reach.models.registry import Score, make_scorer
 from reach.objects import GraspObject
@@ -100,7 +101,9 @@ def _predict(name: str, scene: Scene, grasp: Grasp, pose_error: PoseError, seed:
     scorer = make_scorer(name)
     score = scorer.score(scene, grasp, pose_error=pose_error, seed=seed)
     patches = _patches(scene, grasp) if name == PATCH_MODEL else ()
-    return Prediction(name, scorer.version, score, scorer.parameters, patches)
+    return Prediction(
+        name, scorer.version, score, used_parameters(scorer.parameters, pose_error), patches
+    )
 
 
 def _patches(scene: Scene, grasp: Grasp) -> tuple[PatchRecord, ...]:

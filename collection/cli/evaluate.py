@@ -4,14 +4,12 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 if TYPE_CHECKING:
-    from logs.dataset import Dataset
     from reach.evaluation.table import Evaluation
-    from reach.pose_error import PoseError
 
 DEFAULT_MODELS = (
     "point,point-robust,ellipse,ellipse-robust,reach,reach-robust,settled,settled-robust"
@@ -33,6 +31,9 @@ def evaluate(
         bool, typer.Option(help="Also the paper's protocol: leave one object out.")
     ] = False,
     draws: Annotated[int, typer.Option(help="Parameter draws of the cross-validation.")] = 100,
+    markdown: Annotated[
+        Path | None, typer.Option(help="Write the table as a page, beside the paper's figures.")
+    ] = None,
     plots: Annotated[Path | None, typer.Option(help="Folder for the plots (SVG).")] = None,
     seed: Annotated[int, typer.Option(help="Of perturbations, draws and bootstrap.")] = 0,
     backend: Annotated[
@@ -55,13 +56,16 @@ def evaluate(
     grasp's success rate. Scores are cached; an interrupted run goes on where it stopped.
 
     - `reach evaluate data/physical --models point,reach,reach-robust --json table.json`
-    - `reach evaluate sessions/mon sessions/tue --cross-validate --backend loky`
+    - `reach evaluate sessions/mon sessions/tue --cross-validate --markdown table.md`
     """
     from collection.cli.evaluation_table import evaluation_table, print_table, progress_bars
+    from collection.evaluating import chosen_pose_error, evaluation_content, model_names
     from collection.reporting import write_text
     from logs.dataset_sources import load_labeled
     from reach.evaluation.backends import cluster
     from reach.evaluation.compare import compare, scorers_of
+    from reach.evaluation.protocol import run_protocol
+    from reach.models.registry import make_scorer
 
     dataset = load_labeled(sources, unblinded=unblinded)
     error, basis = chosen_pose_error(dataset, pose_error)
@@ -78,13 +82,36 @@ def evaluate(
             progress=progress,
             use_cache=not fresh,
         )
-        content = {**result.to_json(), "pose_error": basis, "simulated": dataset.simulated}
+        protocol = None
         if cross_validate:
-            content["cross_validation"] = _cross_validation(
-                result, error, [s.name for s in scorers], draws, seed, backend, jobs, progress
+            protocol = run_protocol(
+                result,
+                make_scorer,
+                [scorer.name for scorer in scorers],
+                pose_error=error,
+                draws=draws,
+                seed=seed,
+                backend=backend,
+                jobs=jobs,
+                progress=progress,
             )
+    content = evaluation_content(dataset, result, basis, protocol)
     if plots is not None:
         _write_plots(result, plots)
+    if markdown is not None:
+        from logs.report.table_page import table_page
+
+        command = _command(
+            sources,
+            models=models,
+            pose_error=pose_error,
+            cross_validate=cross_validate,
+            draws=draws if cross_validate else None,
+            seed=seed,
+            unblinded=unblinded,
+            markdown=markdown.name,
+        )
+        write_text(markdown, table_page(content, command))
     if as_json is not None and str(as_json) == "-":
         print(json.dumps(content))
         return
@@ -93,86 +120,14 @@ def evaluate(
     print_table(evaluation_table(content))
 
 
-def model_names(models: str) -> list[str]:
-    """Names in a comma-separated list; `all` stands for every model."""
-    from reach.models.registry import MODEL_NAMES
-
-    if models == "all":
-        return list(MODEL_NAMES)
-    return list(dict.fromkeys(name.strip() for name in models.split(",") if name.strip()))
-
-
-def chosen_pose_error(dataset: Dataset, given: str | None) -> tuple[PoseError, dict[str, Any]]:
-    """The pose error to use, and where it is from."""
-    from logs.errors import DatasetError
-    from reach.pose_error import PoseError
-
-    if given is not None:
-        translation, rotation = _two_numbers(given)
-        basis = "given with --pose-error"
-    elif dataset.pose_error is not None:
-        stated = dataset.pose_error
-        translation, rotation, basis = stated.translation, stated.rotation, stated.basis
-    else:
-        raise DatasetError(
-            f"{dataset.name!r} states no pose error; give one: --pose-error METERS,RADIANS"
-        )
-    error = PoseError.isotropic(translation=translation, rotation=rotation)
-    return error, {"translation": translation, "rotation": rotation, "basis": basis}
-
-
-def _two_numbers(text: str) -> tuple[float, float]:
-    from reach.errors import InvalidInputError
-
-    try:
-        translation, rotation = (float(part) for part in text.split(","))
-    except ValueError:
-        raise InvalidInputError(
-            f"--pose-error is {text!r}, expected METERS,RADIANS such as 0.001,0.003"
-        ) from None
-    return translation, rotation
-
-
-def _cross_validation(
-    result: Evaluation,
-    error: PoseError,
-    names: list[str],
-    draws: int,
-    seed: int,
-    backend: str,
-    jobs: int,
-    progress: Any,
-) -> dict[str, Any]:
-    from reach.evaluation.cross_validation import (
-        cross_validate,
-        draw_parameters,
-        drawable,
-        variants,
-    )
-    from reach.models.registry import make_scorer
-
-    parameters = draw_parameters(seed, draws)
-    table: dict[str, Any] = {"draws": draws, "seed": seed, "models": {}, "exempt": []}
-    for name in names:
-        if not drawable(make_scorer, name):
-            table["exempt"].append(name)
-            continue
-        table["models"][name] = [
-            cross_validate(
-                result.cases,
-                make_scorer,
-                name,
-                parameters,
-                saturated=saturated,
-                pose_error=error,
-                seed=seed,
-                backend=backend,
-                jobs=jobs,
-                progress=progress,
-            ).to_json()
-            for saturated in variants(make_scorer, name)
-        ]
-    return table
+def _command(sources: list[Path], **chosen: object) -> str:
+    """The command that makes a page again: what was chosen, where it is not the default."""
+    options = [
+        f"--{name.replace('_', '-')}" + ("" if value is True else f" {value}")
+        for name, value in chosen.items()
+        if value not in (None, False)
+    ]
+    return " ".join(["reach evaluate", *(path.name or "." for path in sources), *options])
 
 
 def _write_plots(result: Evaluation, folder: Path) -> None:

@@ -39,8 +39,8 @@ def report(
     - `reach report sessions/monday`
     - `reach report data/mon data/tue --out week.html --models point-robust,reach-robust`
     """
-    from collection.cli.evaluate import model_names
     from collection.cli.evaluation_table import progress_bars
+    from collection.evaluating import model_names
     from collection.reporting import write_report
 
     page = out or (sources[0] / "report.html" if len(sources) == 1 else Path("report.html"))

@@ -16,6 +16,8 @@ from reach.evaluation.cases import ObjectOutcomes, Outcomes
 
 DRAWS = 2000
 
+Interval = tuple[float, float] | None
+"""Low and high end; None where nothing is defined."""
 Metric = Callable[[ObjectOutcomes, FloatArray, FloatArray | None], FloatArray]
 
 OBJECT_METRICS: Mapping[str, Metric] = {
@@ -69,7 +71,7 @@ def bootstrap(
     return result
 
 
-def interval(values: FloatArray, level: float = 0.95) -> tuple[float, float] | None:
+def interval(values: FloatArray, level: float = 0.95) -> Interval:
     """Percentile interval of resampled values, or None where none is defined."""
     defined = values[np.isfinite(values)]
     if not len(defined):

@@ -4,10 +4,30 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 from reach.arrays import FloatArray, frozen
 
+if TYPE_CHECKING:
+    from reach.pose_error import PoseError
+
 Parameter = float | bool | str
+
+
+def used_parameters(
+    parameters: Mapping[str, Parameter], pose_error: PoseError | None
+) -> dict[str, Parameter]:
+    """A scorer's parameters, its default pose error replaced by the one that was given.
+
+    Args:
+        parameters: the scorer's own.
+        pose_error: that it scored under; None if it took its default.
+    """
+    used = dict(parameters)
+    if pose_error is not None and "pose_translation" in used:
+        used["pose_translation"] = pose_error.translation_deviation
+        used["pose_rotation"] = pose_error.rotation_deviation
+    return used
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -12,7 +12,7 @@ from reach.cache import cache_key
 from reach.errors import UnknownNameError
 from reach.evaluation.cases import GraspCase
 from reach.evaluation.score_cache import ScoreCache, grasp_digest
-from reach.evaluation.scored import Parameter, ScoredModel
+from reach.evaluation.scored import Parameter, ScoredModel, used_parameters
 from reach.grasp import Grasp
 from reach.scene import Scene
 
@@ -101,9 +101,8 @@ def score_cases(
             progress(done, len(cases))
     if not seconds or backend != "serial":
         seconds = _seconds_alone(cases, scorer, pose_error, seed)
-    return ScoredModel(
-        scorer.name, scorer.version, dict(scorer.parameters), values, float(np.median(seconds))
-    )
+    parameters = used_parameters(scorer.parameters, pose_error)
+    return ScoredModel(scorer.name, scorer.version, parameters, values, float(np.median(seconds)))
 
 
 def _seconds_alone(

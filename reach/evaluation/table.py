@@ -11,13 +11,13 @@ import numpy as np
 from reach.arrays import FloatArray
 from reach.errors import UnknownNameError
 from reach.evaluation import metrics
-from reach.evaluation.bootstrap import DRAWS, OBJECT_METRICS, bootstrap, interval
+from reach.evaluation.bootstrap import DRAWS, OBJECT_METRICS, Interval, bootstrap, interval
 from reach.evaluation.cases import GraspCase, Outcomes, check_scores
+from reach.evaluation.gains import Gain, gains
 from reach.evaluation.references import REFERENCE_NAMES
 from reach.evaluation.scored import Parameter, ScoredModel
 
 METRIC_NAMES = ("ap", "ar", "f1", "mae", "brier")
-Interval = tuple[float, float] | None
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -58,12 +58,14 @@ class Evaluation:
         rows: models in the order asked for, then the references.
         cases: the labeled grasps, in the order of each row's scores.
         outcomes: the same grasps' labels by object.
+        gains: of REACH over the point model, where both were evaluated.
         seed: of the bootstrap.
     """
 
     rows: tuple[ModelRow, ...]
     cases: tuple[GraspCase, ...]
     outcomes: Outcomes
+    gains: tuple[Gain, ...]
     seed: int
 
     def row(self, name: str) -> ModelRow:
@@ -82,6 +84,7 @@ class Evaluation:
         trials = sum(int(one.trials.sum()) for one in self.outcomes.objects)
         return {
             "models": {row.name: _row_json(row) for row in self.rows},
+            "gains": [gain.to_json() for gain in self.gains],
             "references": [row.name for row in self.rows if row.name in REFERENCE_NAMES],
             "objects": {
                 one.name: {
@@ -130,7 +133,8 @@ def tabulate(
     check_scores(scores, len(cases))
     resampled = bootstrap(outcomes, scores, np.random.default_rng(seed), draws)
     rows = tuple(_row(one, outcomes, resampled) for one in scored)
-    return Evaluation(rows, tuple(cases), outcomes, seed)
+    means = {row.name: row.mean for row in rows}
+    return Evaluation(rows, tuple(cases), outcomes, gains(means, resampled), seed)
 
 
 def object_metrics(outcomes: Outcomes, scores: FloatArray) -> dict[str, dict[str, float | None]]:

@@ -10,6 +10,8 @@ from reach.arrays import frozen
 from reach.evaluation import metrics
 from reach.evaluation.bootstrap import bootstrap, interval
 from reach.evaluation.cases import ObjectOutcomes, Outcomes
+from reach.evaluation.gains import gains
+from reach.evaluation.table import mean_metrics
 
 
 def outcomes(successes, trials, name="part"):
@@ -168,3 +170,21 @@ def test_bootstrap_spread_matches_the_two_stage_variance():
     assert np.isnan(drawn["one"]["ap"]).mean() == pytest.approx(0.25, abs=0.03)
     assert set(drawn["one"]["ap"][np.isfinite(drawn["one"]["ap"])]) == {1.0}
     assert interval(np.array([np.nan])) is None
+
+
+def test_gain_is_paired_and_judged_as_the_paper_states_it():
+    """A model that is the rival shifted on every grasp alike gains with no scatter at all."""
+    objects = tuple(outcomes([5, 3, 0], [5, 5, 5], name) for name in "ab")
+    everything = Outcomes(objects, (np.arange(3), np.arange(3, 6)))
+    low = np.array([0.55, 0.35, 0.05] * 2)
+    scores = {"reach": low + 0.2, "point": low}
+    resampled = bootstrap(everything, scores, np.random.default_rng(0), 300)
+    means = {name: mean_metrics(everything, values) for name, values in scores.items()}
+    (gain,) = gains(means, resampled)
+    # Two thresholds more pass for every grasp: recall gains 2/11, the ranking is the same.
+    assert gain.ar == pytest.approx(2 / 11) and gain.ap == pytest.approx(0)
+    assert gain.ar_interval == pytest.approx((2 / 11, 2 / 11))
+    assert gain.as_published is True
+    (back,) = gains(means, resampled, [("point", "reach")])
+    assert back.as_published is False and back.ar == pytest.approx(-2 / 11)
+    assert gains({"reach": means["reach"]}, resampled) == ()

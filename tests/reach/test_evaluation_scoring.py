@@ -152,6 +152,15 @@ def test_a_torn_or_nonsense_cache_line_costs_one_score(tmp_path):
     assert last.calls == 5  # the torn line did not spoil the one written after it
 
 
+def test_scores_state_the_pose_error_they_were_computed_under():
+    scorer = make_scorer("reach-robust", samples=4)
+    given = score_cases(cases(objects=1, grasps=2), scorer, pose_error=ERROR)
+    assert given.parameters["pose_translation"] == pytest.approx(1e-3)
+    assert given.parameters["pose_rotation"] == pytest.approx(3e-3)
+    own = score_cases(cases(objects=1, grasps=2), scorer, pose_error=None)
+    assert own.parameters == scorer.parameters != given.parameters
+
+
 def test_real_models_score_the_same_in_threads_as_in_order():
     scorer = make_scorer("reach-robust", samples=10)
     some = cases(objects=1, grasps=6)

@@ -42,6 +42,11 @@ def test_evaluate_writes_and_prints(folder, tmp_path, capsys):
     again = json.loads(capsys.readouterr().out)
     assert again["pose_error"]["translation"] == 0.002
     assert again["models"]["reach"]["ap"] == content["models"]["reach"]["ap"]
+    page = tmp_path / "docs" / "table.md"
+    assert main([*arguments, "--markdown", str(page), "--pose-error", "0.002,0.006"]) == 0
+    text = page.read_text()
+    assert "--models reach,point-robust --pose-error 0.002,0.006 --seed 0 --markdown" in text
+    assert str(tmp_path) not in text
 
 
 @pytest.mark.parametrize(
