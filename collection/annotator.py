@@ -58,6 +58,7 @@ class Annotator:
         models: names of the models that score each take.
         pose_error: of the station, beside registration's own.
         say: tells the operator what could not be done.
+        quiet: a console owns the terminal: the process beside writes nothing to it.
     """
 
     def __init__(
@@ -68,6 +69,7 @@ class Annotator:
         models: Sequence[str],
         pose_error: PoseError,
         say: Callable[[str], None],
+        quiet: bool = False,
     ) -> None:
         self._session = session
         self._controller = controller
@@ -78,7 +80,7 @@ class Annotator:
         context = multiprocessing.get_context("forkserver")
         lifeline, self._lifeline = context.Pipe(duplex=False)
         self._pool = ProcessPoolExecutor(
-            1, context, initializer=_end_with_session, initargs=(lifeline,)
+            1, context, initializer=_end_with_session, initargs=(lifeline, quiet)
         )
         self._waiting: deque[_Waiting] = deque()
         self._views: list[Future[None]] = []
@@ -182,8 +184,12 @@ def mirror_score(mirror: AnnotationMirror, entry: Entry, prediction: Prediction)
     )
 
 
-def _end_with_session(lifeline: Connection) -> None:
+def _end_with_session(lifeline: Connection, quiet: bool) -> None:
     """In the process beside: leave at once when the session does, or when it was killed."""
+    if quiet:
+        nowhere = os.open(os.devnull, os.O_WRONLY)
+        os.dup2(nowhere, 1)
+        os.dup2(nowhere, 2)
 
     def watch() -> None:
         with suppress(EOFError):

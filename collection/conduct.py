@@ -155,10 +155,17 @@ def _load(options: SessionOptions) -> Station:
 
 
 def _check_operator(options: SessionOptions, station: Station) -> None:
+    from collection.terminal_operator import has_terminal
+
     if options.operator == "auto" and station.simulation is None:
         raise OptionsError(
             f"--operator auto looks at a simulation's truth, and station {options.station!r} is"
             " real; choose web or terminal"
+        )
+    if options.operator == "terminal" and not has_terminal():
+        raise OptionsError(
+            "--operator terminal needs a terminal, and this process has none; choose web, and"
+            " `reach console LINK` where there is one"
         )
 
 
@@ -224,6 +231,7 @@ def _lead(
     from collection.operators import WebConsole, simulated_operator
     from collection.progress import SessionProgress
     from collection.session import Session
+    from collection.terminal_operator import TerminalOperator
     from collection.trial import TrialContext
 
     options, described = setup.options, folder.descriptor
@@ -248,6 +256,7 @@ def _lead(
                 options.models,
                 station.config.pose_error.total(),
                 progress.say,
+                quiet=options.operator == "terminal",
             )
         )
         session = Session(
@@ -260,14 +269,18 @@ def _lead(
             say=progress.say,
         )
         stack.enter_context(ending_on_signals(controller, station, progress.say))
+        session.annotate_earlier()
         if options.operator == "auto":
             stack.enter_context(simulated_operator(controller, station, setup))
+            session.run()
+        elif options.operator == "terminal":
+            link = stack.enter_context(web.serve())
+            TerminalOperator(controller, link, progress).lead(session.run)
         else:
             link = stack.enter_context(web.serve())
             progress.say(f"console   {link}")
             progress.say("or over SSH: reach console LINK")
-        session.annotate_earlier()
-        session.run()
+            session.run()
         annotator.finish(progress.scoring)
 
 

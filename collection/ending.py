@@ -4,12 +4,15 @@ from __future__ import annotations
 
 import signal
 from collections.abc import Callable, Iterator
-from contextlib import ExitStack, contextmanager
+from contextlib import ExitStack, contextmanager, suppress
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from collection.station import Station
     from labeling.controller import SessionController
+
+
+ENDING = (signal.SIGTERM, signal.SIGINT, signal.SIGHUP)
 
 
 def stop_station(station: Station) -> None:
@@ -27,7 +30,7 @@ def stop_station(station: Station) -> None:
 def ending_on_signals(
     controller: SessionController, station: Station, say: Callable[[str], None]
 ) -> Iterator[None]:
-    """SIGTERM and Ctrl-C end the session in order: the robot finishes its motion first.
+    """SIGTERM, Ctrl-C and a lost terminal end the session in order, after the robot's motion.
 
     A second Ctrl-C stops the robot and ends at once.
 
@@ -41,10 +44,11 @@ def ending_on_signals(
         if signum == signal.SIGINT and controller.ending:
             stop_station(station)
             raise KeyboardInterrupt
-        say("ending; the robot finishes its motion first (Ctrl-C stops it)")
+        with suppress(OSError):  # the terminal may be gone
+            say("ending; the robot finishes its motion first (Ctrl-C stops it)")
         controller.request_end()
 
-    before = {number: signal.signal(number, end) for number in (signal.SIGTERM, signal.SIGINT)}
+    before = {number: signal.signal(number, end) for number in ENDING}
     try:
         yield
     finally:

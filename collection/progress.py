@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from types import TracebackType
 from typing import Self
 
@@ -27,6 +29,7 @@ class SessionProgress:
         self._began = time.monotonic()
         self._done_before = 0
         self._shown = -1
+        self._diverted: Callable[[str], None] | None = None
         self._bar = Progress(
             TextColumn("{task.fields[doing]}"),
             BarColumn(bar_width=24),
@@ -55,8 +58,22 @@ class SessionProgress:
         self._bar.stop()
 
     def say(self, message: str) -> None:
-        """Print a line above the progress."""
-        self._console.print(message, markup=False, highlight=False)
+        """Print a line above the progress, or where the lines go now."""
+        if self._diverted is not None:
+            self._diverted(message)
+        else:
+            self._console.print(message, markup=False, highlight=False)
+
+    @contextmanager
+    def elsewhere(self, lines: Callable[[str], None]) -> Iterator[None]:
+        """While something else owns the screen: no live line, and `lines` is told what is said."""
+        self._bar.stop()
+        self._diverted = lines
+        try:
+            yield
+        finally:
+            self._diverted = None
+            self._bar.start()
 
     def scoring(self, waiting: int) -> None:
         """Tell how many takes still wait for their scores."""

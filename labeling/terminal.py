@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import asyncio
+from collections.abc import Callable, Sequence
 from typing import Any, ClassVar, Final
 
 import httpx
+from rich.text import Text
 from textual import events, work
 from textual.app import App, ComposeResult
 from textual.containers import Horizontal, Vertical
@@ -17,6 +19,8 @@ from labeling.terminal_text import banner, choices_text, counters, history, lege
 ALIVE_PERIOD: Final = 1.5
 RETRY_SECONDS: Final = 0.4
 
+SHOWN_LINES: Final = 4
+
 Command = dict[str, Any]
 
 
@@ -25,6 +29,8 @@ class TerminalConsole(App[None]):
 
     Args:
         link: an open connection to a console's server.
+        lines: what the session tells, if it runs in this terminal; the last ones are shown.
+        over: whether the session has ended; then the console leaves.
     """
 
     CSS = """
@@ -34,6 +40,7 @@ class TerminalConsole(App[None]):
     #banner.STOPPED, #banner.LOST { background: darkred; }
     #body { height: 1fr; }
     #trial, #history { padding: 1 2; width: 1fr; }
+    #lines { padding: 0 2; height: auto; max-height: 4; color: $text-muted; }
     #choices { padding: 0 2; height: auto; color: $warning; }
     #receipt { padding: 0 2; height: 1; text-style: bold; }
     #receipt.stored { background: green; }
@@ -43,9 +50,16 @@ class TerminalConsole(App[None]):
     AUTO_FOCUS = None  # the keys are the operator's, not the note's
     BINDINGS: ClassVar = [("ctrl+q", "quit", "leave")]
 
-    def __init__(self, link: TerminalLink) -> None:
+    def __init__(
+        self,
+        link: TerminalLink,
+        lines: Sequence[str] = (),
+        over: Callable[[], bool] = lambda: False,
+    ) -> None:
         super().__init__()
         self._link = link
+        self._lines = lines
+        self._over = over
         self._view: dict[str, Any] | None = None
         self._terms: dict[str, Any] = {}
         self._keys: dict[str, str] = {}
@@ -63,6 +77,7 @@ class TerminalConsole(App[None]):
         with Horizontal(id="body"):
             yield Vertical(Static("", id="trial"))
             yield Vertical(Static("", id="history"))
+        yield Static("", id="lines")
         yield Static("", id="choices")
         yield Static("", id="receipt")
         yield Input(placeholder="note (n); Enter leaves the field", id="note")
@@ -293,6 +308,10 @@ class TerminalConsole(App[None]):
 
     def draw(self) -> None:
         """Show the newest view."""
+        if self._over():
+            self.exit()
+        newest = list(self._lines)[-SHOWN_LINES:]
+        self.query_one("#lines", Static).update(Text("\n".join(newest)))
         view, alive = self._view, self._link.alive
         state = view["state"] if view and (alive or view["state"] == "ENDED") else "LOST"
         shown = self.query_one("#banner", Static)

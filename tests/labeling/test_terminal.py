@@ -127,3 +127,37 @@ def test_no_prediction_before_the_label(bench: Any, serve: Any) -> None:
 def test_a_link_without_its_token_is_refused() -> None:
     with pytest.raises(LabelingError, match="token"):
         TerminalLink("http://127.0.0.1:8000/")
+
+
+def test_the_session_s_lines_are_shown_and_its_end_ends_the_console(bench: Any, serve: Any) -> None:
+    lines = ["the first line", *(f"line {n}" for n in range(4))]
+    over: list[bool] = []
+
+    async def run() -> None:
+        app = TerminalConsole(TerminalLink(serve(bench).link), lines, over=lambda: bool(over))
+        async with app.run_test(size=(120, 40)):
+            await until(app, lambda: bool(app._view))
+            assert "line 3" in shown(app, "lines") and "first" not in shown(app, "lines")
+            lines.append("void: [out of reach]")
+            await until(app, lambda: "[out of reach]" in shown(app, "lines"))
+            over.append(True)
+            await until(app, lambda: app._exit)
+
+    bench.executed()
+    asyncio.run(run())
+
+
+def test_what_was_begun_for_one_take_never_ends_up_on_another(bench: Any, serve: Any) -> None:
+    async def steps(app: TerminalConsole, pilot: Any) -> None:
+        await until(app, lambda: app._target() is not None)
+        await pilot.press("t", "f")
+        await until(app, lambda: len(app.offered()) > 3 and app._rotated)
+        bench.do("label", 1, outcome="success")  # another console was faster
+        bench.executed()
+        await until(app, lambda: bool(app._target() and app._target()["number"] == 2))
+        await pilot.press("1", "s")
+        await until(app, lambda: bench.trial(2).label is not None)
+        assert (bench.trial(2).label.outcome, bench.trial(2).label.rotated) == ("success", False)
+
+    bench.executed()
+    operate(serve(bench).link, steps)
