@@ -119,13 +119,20 @@ def _grasp(record: TrialRecord, *, blind: bool) -> str:
         if not blind:
             lines.append(f"- sensors say: {escaped(execution.sensor_verdict)}")
             for name, value in execution.measurements.items():
-                lines.append(f"- {escaped(name)}: {value:.4g}")
+                lines.append(f"- {escaped(name.replace('_', ' '))}: {_measured(name, value)}")
     if record.stop is None:
         lines.append("- the record has no end: the process was killed")
     elif record.stop.reason:
         lines.append(f"- ended: {record.stop.exit_status}, {escaped(record.stop.reason)}")
     lines += [f"- gap: {escaped(gap.message)}" for gap in record.gaps]
     return "\n".join(lines)
+
+
+def _measured(name: str, value: float) -> str:
+    """A number with its unit, if the record's conventions fix one."""
+    if name.startswith("width"):
+        return f"{value * 1e3:.2f} mm"
+    return f"{value:.1f} N" if name == "force" else f"{value:.4g}"
 
 
 def _registration(record: TrialRecord) -> str:

@@ -1,6 +1,7 @@
 """The views rendered without a screen: nothing fails to draw, and the picture is the known one."""
 
 import io
+import json
 import os
 import socket
 import sys
@@ -51,6 +52,9 @@ def take(made, tmp_path_factory) -> Path:
     write_annotation(folder, LabelRecord(made.TRIAL_ID, 1, 1, "1", 1, "success"))
     score = ScoreRecord(made.TRIAL_ID, 1, 2, "2", 2, "reach", "1", 0.81, patches=made.patches())
     write_annotation(folder, score)
+    path = {"path": json.dumps(made.settling(-0.04))}
+    settled = ScoreRecord(made.TRIAL_ID, 1, 3, "3", 3, "settled", "1", 1.0, texts=path)
+    write_annotation(folder, settled)
     return folder
 
 
@@ -118,6 +122,44 @@ def test_contacts_are_drawn_by_pressure(viewer, take: Path) -> None:
         return yellow.sum() > 15 and violet.sum() > 15
 
     wait_for(has_both_colors, "a patch from violet to yellow is drawn")
+
+
+def ghost_pixels(viewer, view_id: str) -> int:
+    """How much of a view is of the ghosts' red; the pads' orange has far less blue than green."""
+    red, green, blue = pixels_of(viewer, view_id, (640, 480)).reshape(-1, 3).T
+    return int(((red > 90) & (red > 1.4 * green) & (abs(green - blue) < 25)).sum())
+
+
+def test_ghosts_of_the_settling_part_come_with_the_closing_jaws(viewer, take: Path) -> None:
+    open_file(viewer, derive_rrd(take))
+    view_id = next(v for v in viewer.get_state().views if v.name == "scene").view_id
+    viewer.set_time("elapsed", duration=2.0, play_state="paused")
+    wait_for(lambda: ghost_pixels(viewer, view_id) < 30, "before, there are none")
+    viewer.set_time("elapsed", duration=3.2, play_state="paused")
+    wait_for(lambda: ghost_pixels(viewer, view_id) > 300, "ghosts are drawn")
+
+
+def test_ghosts_can_be_switched_off(viewer, take: Path, tmp_path: Path, monkeypatch) -> None:
+    """By the eye beside `predicted_settling` in the viewer's list, which is what this sets."""
+    import rerun.blueprint as rrb
+
+    from logs.view_settling import SETTLING
+
+    scene = rrb.Spatial3DView
+    hidden = {SETTLING: rrb.EntityBehavior(visible=False)}
+    monkeypatch.setattr(
+        "logs.blueprint.rrb.Spatial3DView",
+        lambda **given: scene(**given, overrides=hidden if given["name"] == "scene" else None),
+    )
+    # The viewer keeps an application's first layout: this one needs an application of its own.
+    monkeypatch.setattr("logs.rerun_view.APPLICATION", "reach-trials without ghosts")
+    open_file(viewer, derive_rrd(take, tmp_path / "hidden.rrd"))
+    view_id = next(v for v in viewer.get_state().views if v.name == "scene").view_id
+    viewer.set_time("elapsed", duration=3.2, play_state="paused")
+    wait_for(lambda: pixels_of(viewer, view_id).std() > 10, "the scene is drawn")
+    time.sleep(1)  # ghosts would be drawn by now, as above
+    assert ghost_pixels(viewer, view_id) < 30
+    assert healthy(viewer.get_state().views)
 
 
 def test_the_blind_view_draws_and_shows_no_prediction(viewer, take: Path) -> None:
