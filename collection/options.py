@@ -4,19 +4,9 @@ from __future__ import annotations
 
 from typing import Annotated, Literal
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import BaseModel, ConfigDict, Field, field_validator
 
-DEFAULT_MODELS = (
-    "reach",
-    "reach-robust",
-    "point",
-    "point-robust",
-    "ellipse",
-    "ellipse-robust",
-    "settled",
-    "settled-robust",
-)
-"""Models whose predictions annotate every trial."""
+from reach.models.names import ANALYTIC_NAMES, MODEL_NAMES
 
 OperatorKind = Literal["auto", "web", "terminal"]
 
@@ -44,10 +34,18 @@ class SessionOptions(BaseModel):
     objects: tuple[str, ...]
     grasps: Annotated[int, Field(ge=1)] = 25
     repeats: Annotated[int, Field(ge=1)] = 5
-    operator: OperatorKind = "auto"
+    operator: OperatorKind = "web"
     seed: int = 0
     session: Annotated[int, Field(ge=0)] = 0
     mesh_unit: str = "m"
-    models: tuple[str, ...] = DEFAULT_MODELS
+    models: tuple[str, ...] = ANALYTIC_NAMES
     min_probability: Annotated[float, Field(ge=0, lt=1)] = 0.01
     attempts: Annotated[int, Field(ge=1)] = 8
+
+    @field_validator("models")
+    @classmethod
+    def _known(cls, names: tuple[str, ...]) -> tuple[str, ...]:
+        for name in names:
+            if name not in MODEL_NAMES:
+                raise ValueError(f"no model {name!r}; the models are {', '.join(MODEL_NAMES)}")
+        return names

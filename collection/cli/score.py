@@ -9,6 +9,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from reach.models.names import ANALYTIC_NAMES
+
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
@@ -17,8 +19,6 @@ if TYPE_CHECKING:
     from reach.models.registry import Score, Scorer
     from reach.objects import GraspObject
     from reach.pose_error import PoseError
-
-DEFAULT_MODELS = "reach,reach-robust,point,point-robust,ellipse,ellipse-robust"
 
 
 def score(
@@ -32,17 +32,23 @@ def score(
         str | None,
         typer.Option(help="A mesh file or a built-in part's name; the grasps' own if left out."),
     ] = None,
-    models: Annotated[str, typer.Option(help="Names, separated by commas.")] = DEFAULT_MODELS,
+    models: Annotated[str, typer.Option(help="Names, separated by commas.")] = ",".join(
+        ANALYTIC_NAMES
+    ),
     mesh_unit: Annotated[
         str | None, typer.Option(help="Unit of the mesh file: m, cm, mm or in.")
     ] = None,
     mass: Annotated[float | None, typer.Option(help="Of the part [kg].")] = None,
-    force: Annotated[float, typer.Option(help="Closing force of each jaw [N].")] = 20.0,
+    force: Annotated[
+        float | None, typer.Option(help="Closing force of each jaw [N]; 20 if left out.")
+    ] = None,
     pose_error: Annotated[
         str | None,
-        typer.Option(help="Standard deviations for robust models: metres,radians."),
+        typer.Option(help="Standard deviations for robust models: meters,radians."),
     ] = None,
-    seed: Annotated[int, typer.Option(min=0, help="Of the robust models' samples.")] = 0,
+    seed: Annotated[
+        int | None, typer.Option(min=0, help="Of the robust models' samples; 0 if left out.")
+    ] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print JSON.")] = False,
 ) -> None:
     """Score grasps on a part with contact models, or the recorded trials of sessions anew.
@@ -55,7 +61,11 @@ def score(
     """
     names = [name.strip() for name in models.split(",") if name.strip()]
     if sessions:
-        _score_sessions(sessions, names, grasps, as_json=as_json)
+        _refuse_beside_sessions(
+            grasps=grasps, mesh=mesh, mesh_unit=mesh_unit, mass=mass, force=force,
+            pose_error=pose_error, seed=seed,
+        )  # fmt: skip
+        _score_sessions(sessions, names, as_json=as_json)
         return
     from collection.grasp_file import grasps_of, read_grasp_file
     from collection.objects import load_object
@@ -69,9 +79,9 @@ def score(
         mesh_unit=mesh_unit or (document.mesh_unit if mesh is None else "m"),
         mass=mass,
     )
-    read = grasps_of(document, force)
+    read = grasps_of(document, 20.0 if force is None else force)
     scores = {
-        scorer.name: score_all(scorer, part, read, error, seed, document.gripper)
+        scorer.name: score_all(scorer, part, read, error, seed or 0, document.gripper)
         for scorer in scorers
     }
     if as_json:
@@ -88,18 +98,29 @@ def _given(grasps: Path | None) -> Path:
     return grasps
 
 
-def _score_sessions(
-    sessions: Sequence[Path], names: Sequence[str], grasps: Path | None, *, as_json: bool
-) -> None:
+def _refuse_beside_sessions(**options: object) -> None:
+    """Recorded trials keep the part, the force, the pose error and the seed of their session."""
+    from reach.errors import InvalidInputError
+
+    for name, value in options.items():
+        if value is not None:
+            raise InvalidInputError(
+                f"--{name.replace('_', '-')} {value}: recorded sessions are scored with what they"
+                " recorded; leave it out, or give --grasps FILE instead of sessions"
+            )
+
+
+def _score_sessions(sessions: Sequence[Path], names: Sequence[str], *, as_json: bool) -> None:
     from collection.cli.evaluation_table import progress_bars
     from collection.rescoring import rescore
-    from reach.errors import InvalidInputError
+    from logs.session import SessionFolder
     from reach.models.registry import make_scorer
 
-    if grasps is not None:
-        raise InvalidInputError("--grasps and sessions exclude each other")
+    # A name that does not exist is refused before anything is written.
     for name in names:
-        make_scorer(name)  # an unknown name is refused before anything is written
+        make_scorer(name)
+    for session in sessions:
+        SessionFolder.open(session)
     counts = {}
     with progress_bars() as progress:
         for session in sessions:
@@ -112,7 +133,7 @@ def _score_sessions(
 
 
 def parse_pose_error(text: str | None) -> PoseError | None:
-    """Read `metres,radians`.
+    """Read `meters,radians`.
 
     Raises:
         InvalidInputError: not two finite numbers that are not negative.
@@ -126,7 +147,7 @@ def parse_pose_error(text: str | None) -> PoseError | None:
         translation, rotation = (float(number) for number in text.split(","))
     except ValueError:
         raise InvalidInputError(
-            f"--pose-error is {text!r}, expected metres,radians such as 0.001,0.003"
+            f"--pose-error is {text!r}, expected meters,radians such as 0.001,0.003"
         ) from None
     return PoseError.isotropic(translation=translation, rotation=rotation)
 

@@ -13,6 +13,7 @@ from typing import Any, Protocol
 
 from reach.errors import InvalidInputError, UnknownNameError
 from reach.grasp import Grasp
+from reach.models.names import MODEL_NAMES
 from reach.pose_error import PoseError
 from reach.scene import Scene
 
@@ -27,9 +28,6 @@ _FACTORIES = {
     "settled-robust": "reach.models.settled:make_settled_robust",
     "dynamic": "reach.models.dynamic:make_dynamic",
 }
-MODEL_NAMES = tuple(_FACTORIES)
-ANALYTIC_NAMES = tuple(name for name in MODEL_NAMES if name != "dynamic")
-"""Models cheap enough to score every trial with."""
 
 
 @dataclass(frozen=True, slots=True)

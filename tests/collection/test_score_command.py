@@ -97,3 +97,9 @@ def test_rotations_of_few_digits_are_projected_and_others_refused():
     rough[0, 0] += 0.1
     with pytest.raises(InvalidTransformError, match="orthonormal"):
         rigid(tuple(map(tuple, rough)), "T")
+
+
+@pytest.mark.parametrize("option", ["--pose-error", "--seed", "--mass", "--mesh"])
+def test_options_that_recorded_sessions_cannot_take_are_refused(tmp_path, option):
+    with pytest.raises(InvalidInputError, match=option):
+        run(score, tmp_path, option, "1")

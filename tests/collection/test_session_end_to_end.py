@@ -9,15 +9,15 @@ from pathlib import Path
 import pytest
 
 from collection.cli.main import main
-from collection.options import DEFAULT_MODELS
 from logs.events import Executed, Labelled, Scored, Source
 from logs.journal import read_journal
 from logs.session import SessionFolder
 from logs.trial_record import read_record
+from reach.models.names import ANALYTIC_NAMES
 
 REACH = Path(sys.executable).with_name("reach")
 OBJECTS, GRASPS, REPEATS = "cube_3cm,bracket", 2, 1
-MODELS = set(DEFAULT_MODELS)
+MODELS = set(ANALYTIC_NAMES)
 
 
 def command(out, *extra):

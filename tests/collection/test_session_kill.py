@@ -19,12 +19,12 @@ from typing import Any
 import numpy as np
 import pytest
 
-from collection.options import DEFAULT_MODELS
 from logs.annotation_files import read_annotations
 from logs.events import Executed, Labelled, Scored
 from logs.journal import JOURNAL_NAME, scan_journal
 from logs.session import SessionFolder
 from logs.trial_record import read_record
+from reach.models.names import ANALYTIC_NAMES
 
 REACH = Path(sys.executable).with_name("reach")
 KILLS = int(os.environ.get("REACH_KILLS", "3"))
@@ -208,13 +208,13 @@ def _check_whole(out: Path) -> None:
         take = trial.valid_take
         assert take is not None and take.record is not None and trial.label is not None
         assert {m for t, n, m in scored if (t, n) == (trial.trial_id, take.take)} == set(
-            DEFAULT_MODELS
+            ANALYTIC_NAMES
         )
         beside = (out / take.record).parent
         found = read_annotations(beside)
         assert not found.damaged
         assert found.label is not None and found.label.outcome == trial.label.outcome
-        assert {score.model for score in found.scores} == set(DEFAULT_MODELS)
+        assert {score.model for score in found.scores} == set(ANALYTIC_NAMES)
         assert (beside / "trial.rrd").exists()
     assert set(scored.values()) == {1}, "a take was scored twice by a model"
     assert (out / "report.html").exists()

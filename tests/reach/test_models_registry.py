@@ -8,7 +8,8 @@ import trimesh
 
 from reach import Grasp, GraspObject, ParallelJawGripper, PoseError, Scene, transforms
 from reach.errors import InvalidInputError, UnknownNameError
-from reach.models.registry import ANALYTIC_NAMES, MODEL_NAMES, make_scorer
+from reach.models.names import ANALYTIC_NAMES, MODEL_NAMES
+from reach.models.registry import make_scorer
 
 NAMES = ("reach", "reach-robust", "point", "point-robust", "ellipse", "ellipse-robust")
 
