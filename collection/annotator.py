@@ -22,6 +22,7 @@ from typing import TYPE_CHECKING, Any, Self, TypeVar
 from logs.errors import LogError
 from logs.events import Entry, Scored
 from logs.mirror import AnnotationMirror
+from logs.trial_folder import VIEW_NAME
 
 if TYPE_CHECKING:
     from collection.scoring import Prediction
@@ -93,15 +94,16 @@ class Annotator:
         self._pool.shutdown(wait=True, cancel_futures=True)
 
     def lacks(self, take: TakeState) -> bool:
-        """Whether a take has not got all its scores."""
-        return any(name not in take.scores for name in self._models)
+        """Whether a take has not got all its scores, or no view."""
+        assert take.record is not None
+        view = (self._session.path / take.record).with_name(VIEW_NAME)
+        return bool(self._missing(take)) or not view.exists()
 
     def annotate(self, trial_id: str, take: TakeState) -> None:
         """Annotate a labelled take soon: the scores it lacks, then its view."""
         assert take.record is not None
         folder = (self._session.path / take.record).parent
-        missing = [name for name in self._models if name not in take.scores]
-        job = self._submit(_score, folder, missing, self._pose_error)
+        job = self._submit(_score, folder, self._missing(take), self._pose_error)
         if job is not None:
             self._waiting.append(_Waiting(trial_id, take.take, folder, job))
         self.collect()
@@ -128,6 +130,9 @@ class Annotator:
             self.collect()
         if self._waiting:
             self._say(f"{len(self._waiting)} takes are not scored yet; --resume scores them")
+
+    def _missing(self, take: TakeState) -> list[str]:
+        return [name for name in self._models if name not in take.scores]
 
     def _store(self, waiting: _Waiting) -> None:
         for prediction in self._result(waiting.predictions, "a take was not scored") or ():
@@ -200,6 +205,8 @@ def _end_with_session(lifeline: Connection, quiet: bool) -> None:
 
 
 def _score(folder: Path, models: Sequence[str], pose_error: PoseError) -> list[Prediction]:
+    if not models:  # only its view is missing
+        return []
     from collection.scoring import score_take
 
     return score_take(folder, models, pose_error)

@@ -57,9 +57,10 @@ class SimulatedColorCamera:
 
     def disconnect(self) -> None:
         """Let go of the renderer."""
-        self._scene = None
         if self._context is not None:
             with contextlib.suppress(Exception):  # a driver that fails to close is gone anyway
+                with self._context.as_current():
+                    self._scene = None
                 self._context.free()
         self._context, self._connected, self._detail = None, False, "not connected"
 
@@ -84,11 +85,11 @@ class SimulatedColorCamera:
             raise CameraNotConnectedError(f"the {self.name} is not connected: call connect()")
         if self._context is None:
             return None
-        self._context.make_current()
-        obj = self._simulation.object
-        if self._scene is None or self._scene.object is not obj:
-            self._scene = _DrawnScene(self._arm, obj)
-        image = self._scene.draw(self._simulation)
+        with self._context.as_current():  # only while drawing: any thread may ask for a frame
+            obj = self._simulation.object
+            if self._scene is None or self._scene.object is not obj:
+                self._scene = _DrawnScene(self._arm, obj)
+            image = self._scene.draw(self._simulation)
         return ColorFrame(frozen(image, np.uint8), self._simulation.clock.now_ns())
 
 
@@ -174,8 +175,8 @@ def _open_context() -> tuple[Any, str, str]:
         try:
             module = importlib.import_module(f"mujoco.{renderer}")
             context = module.GLContext(WIDTH, HEIGHT)
-            context.make_current()
-            return context, renderer, f"off-screen renderer: {renderer}"
+            with context.as_current():
+                return context, renderer, f"off-screen renderer: {renderer}"
         except Exception as error:  # every platform fails in its own way where it is missing
             reasons.append(f"{renderer}: {error}".splitlines()[0])
     return None, "", "no off-screen renderer, no video (" + "; ".join(reasons) + ")"

@@ -180,9 +180,9 @@ def test_killed_anywhere_the_session_loses_nothing_and_invents_nothing(
         assert not report.exists() or report.read_text().rstrip().endswith("</html>")
     Sitting(out).finish()
     truth.check(out)
-    _check_whole(out)
     record_property("moments", dict(moments))
-    print(json.dumps(moments))
+    print(json.dumps(moments), flush=True)
+    _check_whole(out)
 
 
 def _planning_seconds(out: Path) -> float:
