@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -30,6 +30,10 @@ class SerialChain:
 
     def __len__(self) -> int:
         return len(self.lower)
+
+    def inside_limits(self, margin: float) -> SerialChain:
+        """The same chain with limits drawn in by a margin [rad]."""
+        return replace(self, lower=frozen(self.lower + margin), upper=frozen(self.upper - margin))
 
     def link_frames(self, joints: FloatArray) -> FloatArray:
         """Poses T_base_link of all links, and last the tip's, shape (..., J + 1, 4, 4).

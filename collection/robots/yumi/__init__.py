@@ -6,6 +6,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from collection.robots.yumi.config import YumiConfig
@@ -17,6 +18,10 @@ if TYPE_CHECKING:
     from collection.robots.yumi.hand import SmartGripper
 
 __all__ = ["YumiConfig", "build"]
+
+LIMIT_MARGIN = 0.03
+"""Plans stay so far inside the joints' limits [rad]: the controller's kinematics differs from ours by
+a millimeter or two, and a plan that ends at a limit is beyond it there."""
 
 
 def build(config: YumiConfig, context: BuildContext) -> tuple[YumiRobotArm, SmartGripper]:
@@ -35,7 +40,9 @@ def build(config: YumiConfig, context: BuildContext) -> tuple[YumiRobotArm, Smar
         from collection.robots.planner import ArmPlanner
         from collection.robots.yumi_arm import yumi_arm
 
-        return ArmPlanner(yumi_arm(config.side), gripper, T_world_base, table_height)
+        arm = yumi_arm(config.side)
+        within = replace(arm, chain=arm.chain.inside_limits(LIMIT_MARGIN))
+        return ArmPlanner(within, gripper, T_world_base, table_height)
 
     hand = SmartGripper(link, gripper, context.station.motion.closing_force)
     return YumiRobotArm(link, make_planner, T_world_base), hand
