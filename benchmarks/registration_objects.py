@@ -12,10 +12,10 @@ from reach import GraspObject
 
 def part(name: str) -> GraspObject:
     """Build one of the PARTS."""
-    return _as_object(name, PARTS[name]())
+    return as_part(name, PARTS[name]())
 
 
-def _as_object(name: str, solid: Any) -> GraspObject:
+def as_part(name: str, solid: Any) -> GraspObject:
     mesh = solid.to_mesh()
     vertices = np.asarray(mesh.vert_properties[:, :3], dtype=float) * 1e-3
     return GraspObject(name, vertices, np.asarray(mesh.tri_verts), mass=0.03)

@@ -40,7 +40,13 @@ def frame_from_cloud(
         InvalidInputError: no point lies in the image.
     """
     points = np.asarray(points_camera, dtype=float).reshape(-1, 3)
-    points = points[np.isfinite(points).all(axis=1) & (points[:, 2] > 0)]
+    points = points[np.isfinite(points).all(axis=1)]
+    if len(points) > 0 and not (points[:, 2] > 0).any():
+        raise InvalidInputError(
+            f"all {len(points)} points of the cloud lie behind the camera, whose frame is "
+            "x right, y down, z ahead: check the cloud's frame"
+        )
+    points = points[points[:, 2] > 0]
     for shrink in range(1, COARSEST + 1):
         coarse = _coarser(intrinsics, shrink)
         u, v, inside = _project(points, coarse)

@@ -3,23 +3,25 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from reach.symmetry import pose_distance
-from registration.evidence import pairwise_margins
+from registration.evidence import Evidence, compare
 from registration.job import Job
+from registration.polish import PRINT_ERROR
+from registration.refine import fit_of
 from registration.search import Hypothesis
+from registration.unobservable import open_ends
 
 CLEARLY_WORSE = 0.15
 """A pose whose render cost is this far above the best one's needs no closer comparison."""
 REFUTED = 0.4
 """With this much evidence for another stable pose, the declared one is taken to be wrong."""
+ENOUGH = float(np.log(200.0))
+"""Log odds that rule a rival out: at most one wrong decision in two hundred."""
 MOST_RIVALS = 5
-VARIANT, TURNED = 1.8e-3, np.radians(5.0)
-"""A part that is nearly symmetric (a gear with a keyway) may be turned with its surfaces parting
-by less than `SensorProfile.distinct`; that is another pose from these distances on [m, rad]."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -29,11 +31,13 @@ class RatedRival:
     Args:
         hypothesis: the rival.
         margin: evidence for the chosen hypothesis against it.
+        log_odds: natural logarithm of how much more likely the image makes the chosen one.
         ruled_out: whether that is evidence enough.
     """
 
     hypothesis: Hypothesis
     margin: float
+    log_odds: float
     ruled_out: bool
 
 
@@ -92,7 +96,7 @@ def _refuted(job: Job, declared: Hypothesis, other: Hypothesis) -> bool:
         return False
     if declared.search is not other.search:
         return declared.cost > other.cost + CLEARLY_WORSE / 2
-    return float(_margins(job, other, [declared])[0]) > REFUTED
+    return float(_evidence(job, other, [declared]).margin[0]) > REFUTED
 
 
 def _winner(job: Job, near: Sequence[Hypothesis]) -> Hypothesis:
@@ -100,57 +104,76 @@ def _winner(job: Job, near: Sequence[Hypothesis]) -> Hypothesis:
     best = near[0]
     for _ in range(len(near)):
         others = [h for h in near if h is not best and h.search is best.search]
-        margins = _margins(job, best, others)
-        if len(margins) == 0 or margins.min() >= 0:
+        odds = _evidence(job, best, others).log_odds
+        if len(odds) == 0 or odds.min() >= 0:
             break
-        best = others[int(np.argmin(margins))]
+        best = others[int(np.argmin(odds))]
     return best
 
 
 def _rivals(job: Job, chosen: Hypothesis, found: Sequence[Hypothesis]) -> list[RatedRival]:
     near = [h for h in found if h.cost <= chosen.cost + CLEARLY_WORSE]
     here = [h for h in near if h.search is chosen.search and _differ(job, chosen, h)]
+    evidence = _evidence(job, chosen, here)
     rated = [
-        RatedRival(h, float(margin), bool(margin >= _required(job, chosen, h)))
-        for h, margin in zip(here, _margins(job, chosen, here), strict=True)
+        RatedRival(h, float(margin), float(odds), _rules_out(job, float(margin), float(odds)))
+        for h, margin, odds in zip(here, evidence.margin, evidence.log_odds, strict=True)
     ]
     # Another thing on the table that the part explains as well: which one is meant, no pixel
     # can tell.
     rated += [
-        RatedRival(h, 0.0, ruled_out=False)
+        RatedRival(h, 0.0, 0.0, ruled_out=False)
         for h in found
         if h.search is not chosen.search
         and h.cost <= job.profile.max_cost
         and _differ(job, chosen, h)
     ]
+    rated += [RatedRival(h, 0.0, 0.0, ruled_out=False) for h in _open_ends(job, chosen)]
     return sorted(rated, key=lambda rival: (rival.ruled_out, rival.margin))
 
 
-def _required(job: Job, chosen: Hypothesis, rival: Hypothesis) -> float:
-    """Evidence that rules a rival out: less for a variant of a nearly symmetric part.
+def _open_ends(job: Job, chosen: Hypothesis) -> list[Hypothesis]:
+    """Where the part may be along directions that the image leaves open."""
+    T = open_ends(
+        chosen.T_camera_object,
+        fit_of(job, chosen).covariance,
+        job.obj.com,
+        job.options.max_turn_error,
+        job.options.max_shift_error,
+    )
+    if len(T) == 0:
+        return []
+    cost = chosen.search.check(T).cost
+    ends = [
+        replace(chosen, T_camera_object=pose, cost=float(c), polished=None)
+        for pose, c in zip(T, cost, strict=True)
+    ]
+    return [end for end in ends if _differ(job, chosen, end)]
 
-    A variant's few differing pixels cannot give much evidence, and mistaking it moves no
-    surface by more than `SensorProfile.distinct`.
-    """
-    apart = job.model.surface_distance(chosen.T_camera_object, rival.T_camera_object)
-    profile = job.profile
-    return profile.min_margin if apart > profile.distinct else profile.variant_margin
+
+def _rules_out(job: Job, margin: float, log_odds: float) -> bool:
+    """The noise could not have turned one pose's image into the other's, nor could a few pixels."""
+    return margin >= job.profile.min_margin and log_odds >= ENOUGH
 
 
-def _margins(
-    job: Job, first: Hypothesis, others: Sequence[Hypothesis]
-) -> np.ndarray[tuple[int], np.dtype[np.float64]]:
-    if not others:
-        return np.zeros(0)
+def _evidence(job: Job, first: Hypothesis, others: Sequence[Hypothesis]) -> Evidence:
     poses = np.stack([h.T_camera_object for h in (first, *others)])
     search = first.search
-    return pairwise_margins(job.model, search.seen, poses, search.fine_tolerance)
+    return compare(
+        job.model,
+        search.seen,
+        poses,
+        tolerance=search.fine_tolerance,
+        noise=job.table.noise,
+        bias=float(np.hypot(job.profile.bias, PRINT_ERROR)),
+    )
 
 
 def _differ(job: Job, a: Hypothesis, b: Hypothesis) -> bool:
-    """Whether two poses put the part's surface elsewhere; symmetric poses do not differ."""
-    apart = job.model.surface_distance(a.T_camera_object, b.T_camera_object)
-    if apart < min(VARIANT, job.profile.distinct):
-        return False
-    turn, _ = pose_distance(job.sym, a.T_camera_object, b.T_camera_object)
-    return apart > job.profile.distinct or turn > TURNED
+    """Whether two poses are not the same up to the part's symmetry, as far as it matters."""
+    turn, shift = pose_distance(job.sym, a.T_camera_object, b.T_camera_object)
+    return (
+        turn > job.options.max_turn_error
+        or shift > job.options.max_shift_error
+        or job.model.surface_distance(a.T_camera_object, b.T_camera_object) > job.profile.distinct
+    )

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 
 from reach.arrays import FloatArray
 from registration.mesh_model import MeshModel
-from registration.observation import FOREIGN, NO_RETURN, PART, Observation
+from registration.observation import FOREIGN, NO_RETURN, Observation
 from registration.render_check import GRAZING
 from registration.rendering import Rendered, render
 
@@ -16,61 +18,113 @@ PIXELS = 16_000
 """Pixels of the part that are looked at, about: small features decide."""
 
 
-def pairwise_margins(
+@dataclass(frozen=True, slots=True, eq=False)
+class Evidence:
+    """What the image says for one pose against N others.
+
+    Args:
+        margin: difference of the two poses' summed losses, divided by the number of pixels whose
+            losses differ (plus a few, so that a handful proves nothing), shape (N,): 1 means
+            that every pixel that can tell speaks for the first pose, 0 that none can or that
+            they contradict.
+        log_odds: natural logarithm of how much more likely the image is under the first pose,
+            given the noise and its correlation, shape (N,).
+    """
+
+    margin: FloatArray
+    log_odds: FloatArray
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Prediction:
+    """What one pose predicts at every pixel (h, w): the part where it is hit, else the table.
+
+    Args:
+        gap: observed minus predicted depth [m], 0 where the pixel says nothing.
+        slope: |normal . ray| of what is predicted, for rays of unit depth.
+    """
+
+    gap: FloatArray
+    slope: FloatArray
+
+
+def compare(
     model: MeshModel,
     seen: Observation,
     T_camera_object: FloatArray,
+    *,
     tolerance: float,
-) -> FloatArray:
-    """Evidence for the first pose against each of the others.
+    noise: float,
+    bias: float,
+) -> Evidence:
+    """Weigh the first pose against each of the others, pixel by pixel.
 
-    The difference of the two poses' summed losses, divided by the number of pixels where the
-    losses differ (plus a few, so that a handful of pixels proves nothing): 1 means that every
-    pixel that can tell speaks for the first pose, 0 that none can or that they contradict.
+    The log odds follow from S, the summed difference of squared residuals. Were the first pose
+    true, S would be normal about mu = sum d^2, with d the poses' difference in depth; were the
+    other true, about -mu. Its variance is 4 v, v = noise^2 A mu + bias^2 (sum d)^2, for A
+    neighboring pixels share their noise, and all share the bias. Hence S mu / (2 v).
 
     Args:
         model: of the part.
         seen: the image's window.
-        T_camera_object: shape (N, 4, 4), N >= 1.
-        tolerance: depths that differ by more disagree fully [m].
-
-    Returns:
-        Shape (N - 1,), each in [-1, 1].
+        T_camera_object: shape (N + 1, 4, 4).
+        tolerance: residuals are cut off here [m].
+        noise: standard deviation of a depth along the normal [m].
+        bias: standard deviation of the error that all depths share [m].
     """
     stride = max(1, int(np.sqrt(len(seen.points) / PIXELS)))
     rendered = render(model, seen, T_camera_object, seen.rays(stride), stride)
-    losses = _losses(seen, rendered, stride, tolerance)
-    few = FEW_PIXELS * max(1.0, seen.table.correlation_area / 4) / stride**2
-    few = max(few, FEW_PIXELS / 2)
-    margins = np.zeros(len(losses) - 1)
-    for i, other in enumerate(losses[1:]):
-        difference = other - losses[0]
-        differing = float(np.minimum(1.0, 2 * np.abs(difference)).sum())
-        margins[i] = difference.sum() / (differing + few)
-    return margins
+    predictions = _predictions(seen, rendered, stride)
+    area = max(1.0, seen.table.correlation_area / stride**2)
+    few = max(FEW_PIXELS * max(1.0, seen.table.correlation_area / 4) / stride**2, FEW_PIXELS / 2)
+    count = len(predictions) - 1
+    margin, log_odds = np.zeros(count), np.zeros(count)
+    for i, other in enumerate(predictions[1:]):
+        own, rival = _residuals(predictions[0], other, tolerance)
+        gain = rival**2 - own**2
+        differing = float(np.minimum(1.0, 2 * np.abs(gain) / tolerance**2).sum())
+        margin[i] = gain.sum() / tolerance**2 / (differing + few)
+        apart = rival - own
+        mu = float((apart**2).sum())
+        variance = noise**2 * area * mu + (bias * float(apart.sum())) ** 2
+        log_odds[i] = gain.sum() * mu / (2 * variance) if mu > 0 else 0.0
+    return Evidence(margin, log_odds)
 
 
-def _losses(
-    seen: Observation, rendered: Rendered, stride: int, tolerance: float
-) -> list[FloatArray]:
-    """Loss of every pixel of the strided window, in [0, 1], for each hypothesis."""
-    depth = seen.depth[::stride, ::stride]
+def _residuals(a: _Prediction, b: _Prediction, tolerance: float) -> tuple[FloatArray, FloatArray]:
+    """Residuals (K,) of two poses along the normal, cut off, where they predict differently."""
+    differ = a.gap != b.gap
+    # The steeper of the two views, so that a grazing face alone decides nothing.
+    slope = np.maximum(np.minimum(a.slope[differ], b.slope[differ]), GRAZING)
+    return (
+        np.clip(a.gap[differ] * slope, -tolerance, tolerance),
+        np.clip(b.gap[differ] * slope, -tolerance, tolerance),
+    )
+
+
+def _predictions(seen: Observation, rendered: Rendered, stride: int) -> list[_Prediction]:
+    """Of each hypothesis, over the strided window."""
     labels = seen.labels[::stride, ::stride]
-    unexplained = (labels == PART).astype(float)
+    depth = seen.depth[::stride, ::stride]
+    table_slope = np.abs((seen.rays(stride) * seen.table.normal_camera).sum(axis=2))
+    with np.errstate(divide="ignore"):
+        table_depth = np.abs(seen.table.offset_camera) / table_slope
+    # What stands on the table beside the part is explained by itself, unless the part would
+    # have hidden it.
+    empty = np.where((labels == NO_RETURN) | (labels == FOREIGN), 0.0, depth - table_depth)
     result, at = [], 0
     for v0, v1, u0, u1 in rendered.boxes:
         shape = (int(v1 - v0), int(u1 - u0))
         count = shape[0] * shape[1]
         hit = rendered.depth[at : at + count].reshape(shape).astype(float)
-        slope = rendered.slope[at : at + count].reshape(shape)
+        steep = rendered.slope[at : at + count].reshape(shape)
         at += count
         box = labels[v0:v1, u0:u1]
-        with np.errstate(invalid="ignore"):
-            gap = (depth[v0:v1, u0:u1] - hit) * np.maximum(slope, GRAZING)
-            inside = np.minimum(1.0, (gap / tolerance) ** 2)
-            silent = (box == NO_RETURN) | ((box == FOREIGN) & (gap < 0))
-        inside = np.where(silent, 0.0, inside)
-        loss = unexplained.copy()
-        loss[v0:v1, u0:u1] = np.where(np.isfinite(hit), inside, unexplained[v0:v1, u0:u1])
-        result.append(loss)
+        gap, slope = empty.copy(), table_slope.copy()
+        inside = depth[v0:v1, u0:u1] - hit
+        silent = (box == NO_RETURN) | ((box == FOREIGN) & ~(inside > 0))
+        meets = np.isfinite(hit)
+        gap[v0:v1, u0:u1] = np.where(meets, np.where(silent, 0.0, inside), gap[v0:v1, u0:u1])
+        slope[v0:v1, u0:u1] = np.where(meets, steep, slope[v0:v1, u0:u1])
+        result.append(_Prediction(gap, slope))
     return result

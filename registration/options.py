@@ -21,8 +21,7 @@ class SensorProfile:
         distinct: poses whose surfaces part by more than this are physically different [m].
         max_cost: a pose with a larger render cost does not explain the image.
         min_margin: less evidence than this against some rival makes a pose ambiguous; see
-            `registration.evidence.pairwise_margins`.
-        variant_margin: the same for a rival whose surface parts by less than `distinct`.
+            `registration.evidence.Evidence`.
         bias: standard deviation of the error that a whole patch of depths shares [m].
     """
 
@@ -31,13 +30,12 @@ class SensorProfile:
     distinct: float
     max_cost: float
     min_margin: float
-    variant_margin: float
     bias: float
 
 
 PROFILES = {
-    "structured-light": SensorProfile((1e-4, 6e-4), 0.8e-3, 3e-3, 0.25, 0.15, 0.05, 3e-5),
-    "stereo": SensorProfile((4e-4, 3e-3), 3e-3, 5e-3, 0.35, 0.15, 0.05, 2e-4),
+    "structured-light": SensorProfile((1e-4, 6e-4), 0.8e-3, 3e-3, 0.25, 0.05, 3e-5),
+    "stereo": SensorProfile((4e-4, 3e-3), 3e-3, 5e-3, 0.35, 0.05, 1e-4),
 }
 """By `DepthFrame.sensor`."""
 
@@ -50,6 +48,9 @@ class RegistrationOptions:
         profile: of the sensor; by the frame's kind of sensor if None.
         max_table_tilt: largest angle between the table's normal and the world's z [rad].
         max_tilt: a part that stands further than this from every stable pose is refused [rad].
+        max_turn_error: a pose that may be turned by more than this, up to the part's symmetry,
+            is ambiguous [rad].
+        max_shift_error: the same for the center of mass [m].
         min_points: fewest depth points of a part.
         check_other_poses: with a declared stable pose, also search the others and notice when
             one of them explains the image better.
@@ -58,6 +59,8 @@ class RegistrationOptions:
     profile: SensorProfile | None = None
     max_table_tilt: float = float(np.radians(15))
     max_tilt: float = float(np.radians(8))
+    max_turn_error: float = float(np.radians(5))
+    max_shift_error: float = 2e-3
     min_points: int = 60
     check_other_poses: bool = True
 

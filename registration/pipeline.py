@@ -19,6 +19,7 @@ from registration.resting import nearest_stable_pose
 from registration.result import Registration, Rival, TableFit
 from registration.search import FREE, Hypothesis
 from registration.unobservable import unobservable_directions
+from registration.variants import with_variants
 
 Mode = Literal["declared", "any", "free"]
 MODES: tuple[str, ...] = get_args(Mode)
@@ -62,6 +63,8 @@ def register(
     found = _search(job, mode, declared)
     with job.timed("refine"):
         found = refine(job, found, declared)
+    with job.timed("variants"):
+        found = with_variants(job, found, declared)
     with job.timed("decide"):
         decision = decide(job, found, declared)
     return _report(job, decision, mode)
@@ -150,6 +153,7 @@ def _report(job: Job, decision: Decision, mode: str) -> Registration:
                 None if rival.hypothesis.stable_pose == FREE else rival.hypothesis.stable_pose,
                 rival.hypothesis.cost,
                 rival.margin,
+                rival.log_odds,
                 rival.ruled_out,
             )
             for rival in decision.rivals

@@ -12,15 +12,15 @@ from dataclasses import dataclass
 import numpy as np
 
 from reach.arrays import FloatArray
-from reach.transforms import exp, inverse, rotation_log
+from reach.transforms import exp, inverse
 from registration.mesh_model import MeshModel
 from registration.observation import Observation
 from registration.options import SensorProfile
+from registration.render_check import GRAZING
+from registration.support import Support
 
 POINTS = 1500
 STEPS = 4
-TILT_SLACK, HEIGHT_SLACK = np.radians(0.4), 2e-4
-"""How far a part on a real table may be from its ideal stable pose: standard deviations [rad, m]."""
 PRINT_ERROR = 3e-5
 """Standard deviation of the part's shape against its mesh, as an offset of the whole pose [m]."""
 UNKNOWN_TURN, UNKNOWN_PLACE = np.radians(60), 0.1
@@ -51,30 +51,28 @@ def polish(
     seen: Observation,
     T_camera_object: FloatArray,
     profile: SensorProfile,
-    *,
-    on_table: bool,
+    support: Support | None,
 ) -> Polished:
     """Refine one pose and tell how well it is known.
 
     Args:
         model: of the part.
         seen: the image's window.
-        T_camera_object: start, shape (4, 4); with on_table it stands on the table.
+        T_camera_object: start, shape (4, 4).
         profile: of the sensor.
-        on_table: hold height and tilt to those of the start, as a table would.
+        support: what the table says of height and tilt; None if the part may lie in any way.
     """
-    noise = seen.table.noise
+    noise = seen.table.noise / seen.table.slope(seen.points.mean(axis=0))
     count = min(POINTS, len(seen.points))
     points = seen.points[np.arange(count) * len(seen.points) // count]
     scale = max(0.4e-3, 3 * noise)
     T = np.array(T_camera_object)
-    support = _Support(T, seen.table.normal_camera, model.obj.com) if on_table else None
     for step in range(STEPS + 1):
-        residual, jacobian = _residuals(model, points, T)
+        residual, jacobian = _in_depth(*_residuals(model, points, T), points, T)
         weight = (scale**2 / (scale**2 + residual**2)) ** 2
         sigma = _spread(residual, weight, noise)
         effective = min(count, len(seen.points) / seen.table.correlation_area)
-        gain = weight * (effective / count / sigma**2)
+        gain = weight * (_efficiency(residual, scale, sigma) * effective / count / sigma**2)
         information = _weighted_gram(jacobian, gain)
         gradient = (jacobian * (gain * residual)[:, None]).sum(axis=0)
         total = information + _vague()
@@ -85,7 +83,8 @@ def polish(
             break
         T = T @ exp(-np.linalg.solve(total, gradient))
     T[:3, :3] = _orthonormal(T[:3, :3])
-    near = np.abs(residual) < max(3 * noise, 0.5e-3)
+    residual, _ = _residuals(model, points, T)
+    near = np.abs(residual) < max(3 * seen.table.noise, 0.5e-3)
     covariance = np.linalg.inv(total) + _systematic(T, points, profile)
     return Polished(
         T,
@@ -94,32 +93,6 @@ def polish(
         fitness=float(near.mean()),
         rmse=float(np.sqrt(np.mean(residual[near] ** 2))) if near.any() else float("inf"),
     )
-
-
-class _Support:
-    """The table's hold on height and tilt, about the pose that stands on it ideally."""
-
-    def __init__(self, T_ideal: FloatArray, up_camera: FloatArray, com: FloatArray) -> None:
-        x = np.cross(up_camera, (1.0, 0.0, 0.0) if abs(up_camera[0]) < 0.9 else (0.0, 1.0, 0.0))
-        x /= np.linalg.norm(x)
-        self._level = np.stack([x, np.cross(up_camera, x)])
-        self._up, self._com = up_camera, com
-        self._R = T_ideal[:3, :3].copy()
-        self._height = float(up_camera @ (T_ideal[:3, :3] @ com + T_ideal[:3, 3]))
-
-    def information(self, T: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Information matrix (6, 6) and gradient (6,) at a pose."""
-        R = T[:3, :3]
-        tilt = self._level @ rotation_log(R @ self._R.T)
-        height = float(self._up @ (R @ self._com + T[:3, 3])) - self._height
-        jacobian = np.zeros((3, 6))
-        jacobian[:2, :3] = self._level @ R
-        up_object = self._up @ R
-        jacobian[2, :3] = np.cross(self._com, up_object)
-        jacobian[2, 3:] = up_object
-        residual = np.array([tilt[0], tilt[1], height])
-        gain = 1.0 / np.array([TILT_SLACK, TILT_SLACK, HEIGHT_SLACK]) ** 2
-        return jacobian.T @ (jacobian * gain[:, None]), jacobian.T @ (gain * residual)
 
 
 def _residuals(
@@ -148,6 +121,21 @@ def _residuals(
     return residual, jacobian
 
 
+def _in_depth(
+    residual: FloatArray, jacobian: FloatArray, points_camera: FloatArray, T: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """Residuals (N,) and Jacobian (N, 6) along the rays, where the sensor errs.
+
+    A depth's error moves a point across a face seen at a slant by less: such faces, the walls
+    that tell how a part is turned, are known better than their share of points says. Below the
+    cosine GRAZING depths err more, too.
+    """
+    ray = points_camera / points_camera[:, 2, None]
+    normal = (jacobian[:, None, 3:] * T[None, :3, :3]).sum(axis=2)
+    slope = np.maximum(np.abs((normal * ray).sum(axis=1)), GRAZING)
+    return residual / slope, jacobian / slope[:, None]
+
+
 def _weighted_gram(jacobian: FloatArray, gain: FloatArray) -> FloatArray:
     """J^T diag(gain) J without BLAS, whose rounding may depend on the number of threads."""
     product = jacobian[:, :, None] * (jacobian * gain[:, None])[:, None, :]
@@ -160,6 +148,20 @@ def _spread(residual: FloatArray, weight: FloatArray, noise: float) -> float:
     inlying = np.abs(residual[weight > 0.25])
     spread = 1.4826 * float(np.median(inlying)) if len(inlying) else 0.0
     return max(spread, 0.7 * noise)
+
+
+def _efficiency(residual: FloatArray, scale: float, sigma: float) -> float:
+    """What a robust fit's weighted residuals (N,) tell, over what their weights alone would say.
+
+    The variance of an M-estimate is E[psi^2] / E[psi']^2, not sigma^2 / E[psi / r] ([Huber1981]).
+    """
+    share = scale**2 / (scale**2 + residual**2)
+    weight = share**2
+    steepness = float((weight * (4 * share - 3)).mean())
+    power = float(((weight * residual) ** 2).mean())
+    if power <= 0.0:
+        return 1.0
+    return float(np.clip(steepness**2 * sigma**2 / (power * weight.mean()), 0.5, 1.2))
 
 
 def _vague() -> FloatArray:

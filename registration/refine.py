@@ -16,8 +16,9 @@ from reach.arrays import FloatArray
 from reach.transforms import exp
 from registration.job import Job
 from registration.polish import Polished, polish
-from registration.resting import nearest_stable_pose, stood_up
+from registration.resting import nearest_copy, nearest_stable_pose, stood_up
 from registration.search import FREE, Hypothesis
+from registration.support import Support
 
 NEAR = 0.06
 """Hypotheses this close to the best render cost are refined."""
@@ -49,7 +50,7 @@ def refine(job: Job, found: Sequence[Hypothesis], declared: int | None) -> list[
         chosen.append(own[0])
     result = list(found)
     for i in chosen:
-        result[i] = _refined(job, found[i])
+        result[i] = refined(job, found[i])
     return sorted(result, key=lambda hypothesis: hypothesis.cost)
 
 
@@ -71,16 +72,16 @@ def standing(job: Job, hypothesis: Hypothesis) -> Hypothesis:
     return replace(hypothesis, T_camera_object=T, stable_pose=index, cost=cost)
 
 
-def _refined(job: Job, start: Hypothesis) -> Hypothesis:
-    """Refine; a freely found pose may stand on the table after all, which then holds it."""
-    refined = _improved(job, start)
+def refined(job: Job, start: Hypothesis) -> Hypothesis:
+    """Refine one; a freely found pose may stand on the table after all, which then holds it."""
+    moved = _improved(job, start)
     if start.stable_pose != FREE:
-        return refined
-    stood = standing(job, refined)
+        return moved
+    stood = standing(job, moved)
     if stood.stable_pose == FREE:
-        return refined
+        return moved
     stood = _improved(job, replace(stood, polished=None))
-    return stood if stood.cost < refined.cost + 0.01 else refined
+    return stood if stood.cost < moved.cost + 0.01 else moved
 
 
 def _improved(job: Job, start: Hypothesis) -> Hypothesis:
@@ -96,12 +97,21 @@ def fit_of(job: Job, hypothesis: Hypothesis) -> Polished:
     """The hypothesis's exact fit, made now if it was not refined."""
     if hypothesis.polished is not None:
         return hypothesis.polished
-    return polish(
-        job.model,
-        hypothesis.search.seen,
-        hypothesis.T_camera_object,
-        job.profile,
-        on_table=hypothesis.stable_pose != FREE,
+    T = hypothesis.T_camera_object
+    return polish(job.model, hypothesis.search.seen, T, job.profile, _support(job, hypothesis))
+
+
+def _support(job: Job, hypothesis: Hypothesis) -> Support | None:
+    if hypothesis.stable_pose == FREE:
+        return None
+    table = job.table
+    up_ideal = job.poses[hypothesis.stable_pose].T_world_object[2, :3]
+    up_object = hypothesis.T_camera_object[:3, :3].T @ table.normal_camera
+    return Support(
+        nearest_copy(up_ideal, up_object, job.sym),
+        job.model.hull_vertices,
+        table.normal_camera,
+        table.offset_camera,
     )
 
 

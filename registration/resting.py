@@ -53,7 +53,7 @@ def stood_up(
         hull_vertices: corners of the part's convex hull, shape (H, 3), object frame [m].
     """
     up_object = T_camera_object[:3, :3].T @ up_camera
-    right = _nearest_copy(pose.T_world_object[2, :3], up_object, sym)
+    right = nearest_copy(pose.T_world_object[2, :3], up_object, sym)
     T = np.array(T_camera_object)
     T[:3, :3] = T_camera_object[:3, :3] @ _turn_between(right, up_object)
     T[:3, 3] += (T_camera_object[:3, :3] - T[:3, :3]) @ sym.center
@@ -62,7 +62,7 @@ def stood_up(
     return T
 
 
-def _nearest_copy(direction: FloatArray, target: FloatArray, sym: Symmetry) -> FloatArray:
+def nearest_copy(direction: FloatArray, target: FloatArray, sym: Symmetry) -> FloatArray:
     """The symmetric copy of a direction that is nearest to a target, both (3,), object frame."""
     if sym.sphere:
         return target

@@ -21,6 +21,7 @@ class Rival:
         stable_pose: its index, None if it is none of them.
         render_cost: as of the chosen pose.
         margin: evidence for the chosen pose against this one, see `Registration.margin`.
+        log_odds: natural logarithm of how much more likely the image makes the chosen pose.
         ruled_out: whether that is evidence enough.
     """
 
@@ -28,6 +29,7 @@ class Rival:
     stable_pose: int | None
     render_cost: float
     margin: float = 0.0
+    log_odds: float = 0.0
     ruled_out: bool = False
 
     def __post_init__(self) -> None:

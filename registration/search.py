@@ -89,15 +89,16 @@ class Search:
         found = self._run(starts, np.full(len(starts), FREE), planar=False)
         # A nearly symmetric part's other poses lie half and quarter turns away.
         best = np.stack([hypothesis.T_camera_object for hypothesis in found[:TURNED_OVER]])
-        starts = _lift(inverse(self._T_camera_table()), turned_over(best, com))
+        starts = _lift(inverse(self.T_camera_table()), turned_over(best, com))
         found += self._run(starts, np.full(len(starts), FREE), planar=False)
         return sorted(found, key=lambda hypothesis: hypothesis.cost)
 
-    def _T_camera_table(self) -> FloatArray:
+    def T_camera_table(self) -> FloatArray:
+        """The frame that hypotheses are aligned in: z up, origin on the table below the part."""
         return self.seen.table.T_camera_table(self.seen.points.mean(axis=0))
 
     def _run(self, starts: FloatArray, names: IntArray, *, planar: bool) -> list[Hypothesis]:
-        T_camera_table = self._T_camera_table()
+        T_camera_table = self.T_camera_table()
         T_table_camera = inverse(T_camera_table)
         points = _transform(T_table_camera, self.seen.points)
         coarse, fine = _subset(points, COARSE_POINTS), _subset(points, FINE_POINTS)
@@ -122,12 +123,32 @@ class Search:
         order = np.argsort(check.cost, kind="stable")
         order = order[: KEPT_RENDERED if planar else KEPT_RENDERED_FREE]
         order = order[check.cost[order] <= check.cost[order[0]] + HOPELESS]
-        T, _ = self._align(T[order], fine, self._fine_scales(), planar=planar)
-        T_camera_object = _lift(T_camera_table, T)
-        check = self.check(T_camera_object)
+        return self._finish(T[order], names[order], fine, planar=planar)
+
+    def from_starts(
+        self, T_table_object: FloatArray, names: IntArray, *, planar: bool
+    ) -> list[Hypothesis]:
+        """Align and render starts (N, 4, 4) that are nearly right, by rising cost.
+
+        Args:
+            T_table_object: starts, in the frame `T_camera_table`.
+            names: stable pose of each, or FREE, shape (N,).
+            planar: keep them standing on the table.
+        """
+        points = _transform(inverse(self.T_camera_table()), self.seen.points)
+        return self._finish(T_table_object, names, _subset(points, FINE_POINTS), planar=planar)
+
+    def _finish(
+        self, T: FloatArray, names: IntArray, points: FloatArray, *, planar: bool
+    ) -> list[Hypothesis]:
+        T, _ = self._align(T, points, self._fine_scales(), planar=planar)
+        T_camera_object = _lift(self.T_camera_table(), T)
+        cost = self.check(T_camera_object).cost
+        if not planar:
+            cost = cost + self._below_table(T)
         return [
-            Hypothesis(T_camera_object[i], int(names[order[i]]), float(check.cost[i]), self)
-            for i in np.argsort(check.cost, kind="stable")
+            Hypothesis(T_camera_object[i], int(names[i]), float(cost[i]), self)
+            for i in np.argsort(cost, kind="stable")
         ]
 
     def check(self, T_camera_object: FloatArray, pixels: int = FINE_PIXELS) -> RenderCheck:

@@ -55,6 +55,10 @@ class Table:
         """Angle between the table's normal and the world's z [rad]."""
         return float(np.arccos(np.clip(self.normal_world[2], -1.0, 1.0)))
 
+    def slope(self, point_camera: FloatArray) -> float:
+        """|normal . ray| for the ray of unit depth through a point (3,): the height of a depth."""
+        return float(np.abs(self.normal_camera @ point_camera) / point_camera[2])
+
     def T_camera_table(self, near_camera: FloatArray) -> FloatArray:
         """Frame with z up from the table, origin on the table below a point (3,), x near world x."""
         up = self.normal_camera
@@ -156,7 +160,10 @@ def _best_plane(
         if count > best_count:
             best, best_count = int(i), count
     if best_count < 0:
-        raise NoTableError("no table: no plane in the image is nearly level in the world")
+        raise NoTableError(
+            "no table: no plane in the image is nearly level in the world; "
+            "check that T_world_camera is the camera's pose and the world's z points up"
+        )
     return normals[best], float(offsets[best])
 
 
@@ -191,13 +198,28 @@ def _correlation_area(frame: DepthFrame, normal: FloatArray, offset: float, nois
     residual = middle * slope - offset
     residual[~(np.abs(residual) < 3 * noise)] = np.nan
     variance = float(np.nanmean(residual**2)) if np.isfinite(residual).any() else 1.0
-    line = 1.0
+    correlation: list[float] = []
     for lag in range(1, reach + 1):
         product = residual[:, lag:] * residual[:, :-lag]
         if not np.isfinite(product).any():
             break
-        correlation = float(np.nanmean(product)) / variance
-        if correlation < 0.05:
+        value = float(np.nanmean(product)) / variance
+        if value < 0.05:
             break
-        line += 2.0 * correlation
-    return line**2
+        correlation.append(value)
+    return _area(correlation)
+
+
+def _area(correlation: list[float]) -> float:
+    """Sum of a mixture of white and smooth noise's autocorrelation over the plane [pixel].
+
+    The smooth noise's share is where its correlation, taken for Gaussian, would be at lag 0.
+
+    Args:
+        correlation: along a line, at lags 1, 2, ..., as far as there is any.
+    """
+    share = 1.0
+    if len(correlation) > 1:
+        share = min(1.0, correlation[0] * max(1.0, correlation[0] / correlation[1]) ** (1 / 3))
+    line = 1.0 + 2.0 * sum(correlation) / share
+    return 1.0 + share * (line**2 - 1.0)

@@ -5,10 +5,55 @@ from __future__ import annotations
 import numpy as np
 
 from reach.arrays import FloatArray
+from reach.transforms import make_transform, rotation_about, skew
 
 OPEN = 3e-3
 """A direction is open if its standard deviation moves the part's rim by more than this [m]."""
 _AXES = ("x", "y", "z")
+
+
+CONFIDENCE = 2.33
+"""Standard deviations within which 98 % of a direction's errors lie."""
+FAR = 3.0
+"""An open direction is followed no further than so many times what is known well enough."""
+
+
+def open_ends(
+    T: FloatArray, covariance: FloatArray, com: FloatArray, max_turn: float, max_shift: float
+) -> FloatArray:
+    """Poses at both ends of what the image leaves open, shape (K, 4, 4).
+
+    A pose that is known to within the limits has none. Along a direction that is known less well,
+    the ends are where the pose would be if its error there were as large as it may well be, with
+    the other directions following as the covariance says.
+
+    Args:
+        T: pose, shape (4, 4).
+        covariance: of (rotation, translation), right perturbation, object frame, shape (6, 6).
+        com: the part's center of mass, shape (3,), object frame [m].
+        max_turn: rotation that is known well enough [rad].
+        max_shift: shift of the center of mass that is known well enough [m].
+    """
+    to_com = np.eye(6)
+    to_com[3:, :3] = -skew(com)
+    about_com = to_com @ covariance @ to_com.T
+    ends = []
+    for part, limit in ((slice(0, 3), max_turn), (slice(3, 6), max_shift)):
+        values, vectors = np.linalg.eigh(about_com[part, part])
+        for value, vector in zip(values, vectors.T, strict=True):
+            reach = CONFIDENCE * np.sqrt(value)
+            if reach > limit:
+                # Further off it is another pose no less, and the covariance no longer holds.
+                step = about_com[:, part] @ vector / value * min(reach, FAR * limit)
+                ends += [T @ _moved(sign * step, com) for sign in (1, -1)]
+    return np.array(ends).reshape(-1, 4, 4)
+
+
+def _moved(step: FloatArray, com: FloatArray) -> FloatArray:
+    """A turn about, and a shift of, the center of mass (6,) as a transform (4, 4)."""
+    angle = float(np.linalg.norm(step[:3]))
+    R = rotation_about(step[:3], angle) if angle > 0 else np.eye(3)
+    return make_transform(R, com - R @ com + step[3:])
 
 
 def unobservable_directions(
@@ -22,9 +67,7 @@ def unobservable_directions(
         radius: of the part about it [m].
     """
     about_com = np.eye(6)
-    about_com[3:, :3] = np.array(
-        [[0.0, -com[2], com[1]], [com[2], 0.0, -com[0]], [-com[1], com[0], 0.0]]
-    )
+    about_com[3:, :3] = skew(com)
     # Turns count by how far they move the rim, so that both kinds of direction are in meters.
     scale = np.diag([1 / radius] * 3 + [1.0] * 3)
     scaled = scale @ about_com.T @ information @ about_com @ scale

@@ -10,7 +10,11 @@ import typer
 
 if TYPE_CHECKING:
     from reach.objects import GraspObject
+    from registration.frame import DepthFrame
     from registration.result import Registration
+
+FARTHEST = 20.0
+"""No depth camera sees a table from further away [m]."""
 
 
 def register(
@@ -59,6 +63,7 @@ def register(
         check_picture(picture)
     part = load_object(mesh, mesh_unit)
     frame = read_cloud(cloud, camera, sensor)
+    _check_unit(cloud, frame)
     chosen_mode: Any = mode or ("any" if stable_pose is None else "declared")
     found = find(part, frame, stable_pose=stable_pose, mode=chosen_mode, seed=seed)
     if picture is not None:
@@ -67,6 +72,26 @@ def register(
         typer.echo(json.dumps(registration_json(part, found)))
     else:
         _print(part, found)
+
+
+def _check_unit(cloud: Path, frame: DepthFrame) -> None:
+    """Refuse depths that can only be millimeters, before they are taken for an empty table."""
+    import numpy as np
+
+    from registration.errors import CloudFileError
+
+    if not np.isfinite(frame.depth).any():
+        raise CloudFileError(f"{cloud.name!r} holds no depth at all")
+    depth = float(np.nanmedian(frame.depth))
+    if depth > FARTHEST:
+        remedy = (
+            "divide its depths by 1000"
+            if cloud.suffix == ".npz"
+            else 'say "unit": "mm" in the camera file'
+        )
+        raise CloudFileError(
+            f"{cloud.name!r} read in m is {depth:.0f} m away; it is probably in millimeters: {remedy}"
+        )
 
 
 def registration_json(part: GraspObject, found: Registration) -> dict[str, Any]:
@@ -94,6 +119,7 @@ def registration_json(part: GraspObject, found: Registration) -> dict[str, Any]:
                 "stable_pose": rival.stable_pose,
                 "render_cost": rival.render_cost,
                 "margin": rival.margin,
+                "log_odds": rival.log_odds,
                 "ruled_out": rival.ruled_out,
             }
             for rival in found.rivals

@@ -128,3 +128,20 @@ def test_a_cloud_in_world_coordinates_and_millimeters(app, scene, is_right):
         *("--camera", folder / "world.json", "--json"),
     )
     assert is_right(case, np.array(json.loads(answer.stdout)["T_camera_object"]))
+
+
+def test_millimeters_taken_for_meters_are_told(app, scene):
+    import open3d
+
+    folder, case = scene
+    points = case.frame.points_camera().reshape(-1, 3)
+    points = 1e3 * points[np.isfinite(points).all(axis=1)]
+    cloud = open3d.geometry.PointCloud(open3d.utility.Vector3dVector(points))
+    open3d.io.write_point_cloud(str(folder / "mm.ply"), cloud)
+    with pytest.raises(ReachError, match='probably in millimeters: say "unit": "mm"'):
+        given = ("--camera", folder / "camera.json")
+        run(app, "--mesh", folder / "part.stl", "--cloud", folder / "mm.ply", *given)
+    flipped = open3d.geometry.PointCloud(open3d.utility.Vector3dVector(-points / 1e3))
+    open3d.io.write_point_cloud(str(folder / "flipped.ply"), flipped)
+    with pytest.raises(ReachError, match="behind the camera"):
+        run(app, "--mesh", folder / "part.stl", "--cloud", folder / "flipped.ply", *given)
