@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import io
 from collections.abc import Mapping, Sequence
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -42,6 +43,8 @@ APPLICATION = "reach-trials session"
 PICTURES = 300
 """Only this many trials, worst disagreements first, carry a picture: it must be decoded."""
 PICTURE_WIDTH = 400
+_NO_TRIANGLE = np.zeros((1, 3, 3))
+"""Drawn where there is no contact: a viewer that loads a file piece by piece ignores `Clear`."""
 
 
 def write_session_view(session: Path, out: Path, model: str | None = None) -> Path:
@@ -115,27 +118,19 @@ class _SessionDrawing:
 
     def _draw_contacts(self, scores: Mapping[str, ScoreRecord]) -> None:
         model = model_with_contacts(dict(scores))
-        if model is None:
-            self._log(layout.CONTACTS, rr.Clear(recursive=True))
-            return
-        score = scores[model]
-        highest = brightest_pressure(score)
-        patches = [patch for patch in score.patches if len(patch.triangles_object)]
-        if patches:
-            lifted = [p.triangles_object - PROUD * p.normal_object for p in patches]
-            shades = [pressure_rgba(patch, highest) for patch in patches]
-            mesh = flat_mesh(np.concatenate(lifted), None, np.concatenate(shades))
-            self._log(f"{layout.CONTACTS}/pressure", mesh)
-        else:
-            self._log(f"{layout.CONTACTS}/pressure", rr.Clear(recursive=False))
-        self._log(f"{layout.CONTACTS}/force", force_arrows(score.patches, self._poses.diameter))
+        patches = scores[model].patches if model else ()
+        shapes = [_NO_TRIANGLE, *(p.triangles_object - PROUD * p.normal_object for p in patches)]
+        shades = [np.zeros((3, 4), np.uint8)]
+        if model:
+            highest = brightest_pressure(scores[model])
+            shades += [pressure_rgba(patch, highest) for patch in patches]
+        mesh = flat_mesh(np.concatenate(shapes), None, np.concatenate(shades))
+        self._log(f"{layout.CONTACTS}/pressure", mesh)
+        self._log(f"{layout.CONTACTS}/force", force_arrows(patches, self._poses.diameter))
 
     def _draw_picture(self, path: Path | None) -> None:
-        picture = _picture(path) if path else None
-        if picture is None:
-            self._log(layout.PICTURE, rr.Clear(recursive=False))
-        else:
-            self._log(layout.PICTURE, rr.EncodedImage(contents=picture, media_type="image/jpeg"))
+        picture = (_picture(path) if path else None) or _no_picture()
+        self._log(layout.PICTURE, rr.EncodedImage(contents=picture, media_type="image/jpeg"))
 
     def _send_list(self, shown: Sequence[OverviewRow]) -> None:
         texts = [headline(item, self._judge) for item in shown]
@@ -179,6 +174,21 @@ def _picture(path: Path) -> bytes | None:
         shade = np.nan_to_num((far - depth) / max(far - near, 1e-6), nan=0.0).clip(0, 1)
         image = Image.fromarray((shade * 255).astype(np.uint8), "L")
     image.thumbnail((PICTURE_WIDTH, PICTURE_WIDTH))
+    return _jpeg(image)
+
+
+@cache
+def _no_picture() -> bytes:
+    """What stands where a step has no picture."""
+    from PIL import Image, ImageDraw
+
+    image = Image.new("RGB", (PICTURE_WIDTH, PICTURE_WIDTH // 2), (24, 27, 33))
+    text = f"no picture here: only the first {PICTURES} steps by disagreement have one"
+    ImageDraw.Draw(image).text((12, 90), text, fill=(150, 156, 168))
+    return _jpeg(image)
+
+
+def _jpeg(image: Any) -> bytes:
     buffer = io.BytesIO()
     image.save(buffer, "jpeg", quality=85)
     return buffer.getvalue()

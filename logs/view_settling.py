@@ -21,7 +21,7 @@ from reach.transforms import as_transform
 
 SETTLING = f"{WORLD}/predicted_settling"
 """One child a model; below it ghosts of the `way`, and of the part once it is `settled`."""
-LEAST_APART = 1e-3
+LEAST_APART = 2e-3
 """A part that settles by less at all its corners is drawn nowhere else [m]."""
 STEPS = 5
 """So many steps of equal length are drawn at most: more ghosts would only blur."""

@@ -134,6 +134,23 @@ def test_each_step_shows_its_own_object_alone(session: SessionFolder, tmp_path: 
         assert shown_object_at(path, trial.number) == {trial.object_name}
 
 
+def test_every_step_sets_whatever_any_step_sets(
+    session: SessionFolder, tmp_path: Path, monkeypatch
+) -> None:
+    """Else, in another order, a step would show what an earlier one left behind."""
+    from rerun.chunk import RrdReader
+
+    monkeypatch.setattr("logs.session_view.PICTURES", 2)
+    steps: dict[str, set[int]] = {}
+    for chunk in RrdReader(str(write_session_view(session.path, tmp_path / "all.rrd"))).stream():
+        batch = chunk.to_record_batch()
+        if "by_outcome" in batch.schema.names:
+            found = steps.setdefault(str(chunk.entity_path), set())
+            found |= set(batch.column("by_outcome").to_pylist())
+    assert {"/picture", "/scene/contacts/pressure", "/scene/contacts/force"} <= set(steps)
+    assert {entity for entity, found in steps.items() if found != {1, 2, 3, 4, 5}} == set()
+
+
 def test_an_unreadable_record_is_a_step_that_says_so(sessions, tmp_path: Path) -> None:
     folder = sessions.build_session(tmp_path / "s", 3, samples=2)
     broken = folder.path / list_takes(folder.path)[1].folder / RECORD_NAME
