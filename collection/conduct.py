@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import getpass
 import json
 import sys
 from collections.abc import Mapping
@@ -15,7 +14,7 @@ from pydantic import ValidationError
 from rich.console import Console
 
 from collection.errors import OptionsError
-from collection.options import SessionOptions
+from collection.options import SessionOptions, Sitting
 from collection.setup import (
     Setup,
     fingerprints,
@@ -33,8 +32,6 @@ if TYPE_CHECKING:
     from labeling.controller import SessionController
     from logs.mirrored_journal import MirroredJournal
 
-DEFAULTS: Mapping[str, Any] = {"operator": "web"}
-
 
 @dataclass(frozen=True, slots=True)
 class Conduct:
@@ -45,6 +42,7 @@ class Conduct:
         given: the options that were given, by name.
         resume: continue the session in `out`.
         accepted: parts of the set-up that may have changed.
+        sitting: who labels, and where the console listens.
         report: whether to write the report at the end.
         as_json: print the summary as JSON, and nothing else, on standard output.
     """
@@ -53,6 +51,7 @@ class Conduct:
     given: Mapping[str, Any]
     resume: bool
     accepted: tuple[str, ...]
+    sitting: Sitting
     report: bool
     as_json: bool
 
@@ -72,14 +71,21 @@ def conduct(asked: Conduct) -> None:
         _run(asked, folder, setup, station, terminal)
 
 
-def show_plan(given: Mapping[str, Any], *, as_json: bool) -> None:
-    """Print what a session would do; nothing moves and nothing is written."""
+def show_plan(asked: Conduct) -> None:
+    """Print what a session would do; nothing moves and nothing is written.
+
+    Raises:
+        ReachError: bad input, as if the session were to run.
+    """
     from collection.plan_table import pose_table, trial_table
 
-    options = resolve(given)
-    station = _load(options)
+    if asked.resume:
+        raise OptionsError(
+            "--dry-run shows what a new session would do; `reach status` tells what is left of this"
+        )
+    options, station = _checked(asked)
     setup = make_setup(options, station)
-    if as_json:
+    if asked.as_json:
         print(setup.plan.to_json())
         return
     terminal = Console()
@@ -104,14 +110,30 @@ def resolve(given: Mapping[str, Any]) -> SessionOptions:
             f" built-in: {', '.join(OBJECT_NAMES)}"
         )
     try:
-        return SessionOptions(**{**DEFAULTS, **given})
+        return SessionOptions(**given)
     except ValidationError as error:
         first = error.errors()[0]
         name = str(first["loc"][0]).replace("_", "-")
-        raise OptionsError(f"--{name} {first['input']!r}: {first['msg']}") from error
+        told = first["msg"].removeprefix("Value error, ")
+        given_value = first["input"]
+        typed = ",".join(given_value) if isinstance(given_value, tuple) else given_value
+        raise OptionsError(f"--{name} {typed!r}: {told}") from error
 
 
 def _create(asked: Conduct, terminal: Console) -> tuple[SessionFolder, Setup, Station]:
+    options, station = _checked(asked)
+    with terminal.status("planning"):
+        setup = make_setup(options, station)
+    folder = SessionFolder.create(asked.out, setup.descriptor(station), setup.files())
+    return folder, setup, station
+
+
+def _checked(asked: Conduct) -> tuple[SessionOptions, Station]:
+    """What a new session is asked to be, if that can be.
+
+    Raises:
+        ReachError: it cannot; nothing was written.
+    """
     from logs.errors import SessionExistsError
 
     options = resolve(asked.given)
@@ -120,11 +142,8 @@ def _create(asked: Conduct, terminal: Console) -> tuple[SessionFolder, Setup, St
     if asked.out.exists():
         raise SessionExistsError(asked.out)
     station = _load(options)
-    _check_operator(options, station)
-    with terminal.status("planning"):
-        setup = make_setup(options, station)
-    folder = SessionFolder.create(asked.out, setup.descriptor(station), setup.files())
-    return folder, setup, station
+    _check_operator(options, station, asked.sitting)
+    return options, station
 
 
 def _reopen(asked: Conduct) -> tuple[SessionFolder, Setup, Station]:
@@ -134,7 +153,16 @@ def _reopen(asked: Conduct) -> tuple[SessionFolder, Setup, Station]:
         if name not in ACCEPTABLE_CHANGES:
             raise UnknownNameError("change", name, ACCEPTABLE_CHANGES)
     planned = setup.options.model_dump()
-    for name in ("objects", "grasps", "repeats", "seed", "session", "mesh_unit"):
+    for name in (
+        "objects",
+        "grasps",
+        "repeats",
+        "seed",
+        "session",
+        "mesh_unit",
+        "models",
+        "min_probability",
+    ):
         if name in asked.given and asked.given[name] != planned[name]:
             raise OptionsError(
                 f"--{name.replace('_', '-')} {asked.given[name]!r} differs from the session's"
@@ -144,7 +172,7 @@ def _reopen(asked: Conduct) -> tuple[SessionFolder, Setup, Station]:
     options = setup.options.model_copy(update=changed)
     station = _load(options)
     same_station(station, setup, asked.out)
-    _check_operator(options, station)
+    _check_operator(options, station, asked.sitting)
     return folder, Setup(options, station.text, setup.objects, setup.plan), station
 
 
@@ -154,7 +182,7 @@ def _load(options: SessionOptions) -> Station:
     return load_station(options.station, seed=options.seed)
 
 
-def _check_operator(options: SessionOptions, station: Station) -> None:
+def _check_operator(options: SessionOptions, station: Station, sitting: Sitting) -> None:
     from collection.terminal_operator import has_terminal
 
     if options.operator == "auto" and station.simulation is None:
@@ -167,6 +195,8 @@ def _check_operator(options: SessionOptions, station: Station) -> None:
             "--operator terminal needs a terminal, and this process has none; choose web, and"
             " `reach console LINK` where there is one"
         )
+    if options.operator != "auto":
+        sitting.access()  # refuses an address that others could reach
 
 
 def _run(
@@ -199,11 +229,11 @@ def _run(
             stored,
             state,
             fingerprints(station, setup.plan),
-            operator=getpass.getuser(),
+            operator=asked.sitting.person,
             source=Source.OPERATOR_SIM if auto else Source.OPERATOR,
             accept=asked.accepted,
         )
-        _lead(folder, setup, station, controller, journal, terminal)
+        _lead(asked.sitting, folder, setup, station, controller, journal, terminal)
         whole = state.next_work() is None and not controller.ending
         status = "finished" if whole else "ended"
     except ReachError as error:
@@ -218,6 +248,7 @@ def _run(
 
 
 def _lead(
+    sitting: Sitting,
     folder: SessionFolder,
     setup: Setup,
     station: Station,
@@ -235,7 +266,7 @@ def _lead(
     from collection.trial import TrialContext
 
     options, described = setup.options, folder.descriptor
-    web = WebConsole(controller, setup, folder, simulated=described.simulated)
+    web = WebConsole(controller, setup, folder, sitting, simulated=described.simulated)
     context = TrialContext(
         described.session_id,
         folder.path,
@@ -275,7 +306,7 @@ def _lead(
             session.run()
         elif options.operator == "terminal":
             link = stack.enter_context(web.serve())
-            TerminalOperator(controller, link, progress).lead(session.run)
+            TerminalOperator(controller, sitting.actor(), link, progress).lead(session.run)
         else:
             link = stack.enter_context(web.serve())
             progress.say(f"console   {link}")

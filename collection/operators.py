@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import getpass
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -14,6 +13,7 @@ import numpy as np
 from collection.placing import placing_picture
 
 if TYPE_CHECKING:
+    from collection.options import Sitting
     from collection.setup import Setup
     from collection.station import Station
     from labeling.controller import SessionController
@@ -54,12 +54,13 @@ def _nearest_pose(station: Station, setup: Setup, trial: TrialState, take: TakeS
 
 
 class WebConsole:
-    """The page, served to this machine.
+    """The page, served while the session runs.
 
     Args:
         controller: the session's writer.
         setup: of the session.
         folder: of the session.
+        sitting: who labels, and where the page is served.
         simulated: the station is simulated.
     """
 
@@ -68,6 +69,7 @@ class WebConsole:
         controller: SessionController,
         setup: Setup,
         folder: SessionFolder,
+        sitting: Sitting,
         *,
         simulated: bool,
     ) -> None:
@@ -76,29 +78,27 @@ class WebConsole:
         self._controller = controller
         self._setup = setup
         self._folder = folder
+        self._sitting = sitting
         self._simulated = simulated
         self._shelf = PictureShelf(folder.path)
 
     @contextmanager
     def serve(self) -> Iterator[str]:
         """Serve the page; yields the link that opens it."""
-        from labeling.access import make_access
-        from labeling.commands import Actor
         from labeling.console import Console
         from labeling.reviewing import blind_recording
-        from labeling.server import ConsoleServer, free_port
-        from logs.events import Source
+        from labeling.server import ConsoleServer
 
         console = Console(
             self._controller,
-            Actor(getpass.getuser(), Source.OPERATOR),
+            self._sitting.actor(),
             title=self._folder.path.name,
             pictures=self._shelf,
             recordings=lambda trial: blind_recording(self._folder, trial),
             root=self._folder.path,
             simulated=self._simulated,
         )
-        access = make_access("127.0.0.1", free_port("127.0.0.1"))
+        access = self._sitting.access()
         forget = self._controller.listen(self._offer_placing_picture)
         try:
             with ConsoleServer(console, access) as server:

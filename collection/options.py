@@ -2,11 +2,18 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Literal
+import getpass
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, field_validator
 
 from reach.models.names import ANALYTIC_NAMES, MODEL_NAMES
+
+if TYPE_CHECKING:
+    from labeling.access import Access
+    from labeling.commands import Actor
 
 OperatorKind = Literal["auto", "web", "terminal"]
 
@@ -49,3 +56,53 @@ class SessionOptions(BaseModel):
             if name not in MODEL_NAMES:
                 raise ValueError(f"no model {name!r}; the models are {', '.join(MODEL_NAMES)}")
         return names
+
+
+@dataclass(frozen=True, slots=True)
+class Sitting:
+    """Who labels, and where the console listens: of one sitting, not of the session.
+
+    Args:
+        name: of the person; the login name if None.
+        host: address that the console listens on.
+        port: its port; 0 takes a free one.
+        token: secret of the console, needed beyond this machine.
+        certificate: TLS certificate (PEM), needed beyond this machine.
+        key: its private key (PEM).
+    """
+
+    name: str | None = None
+    host: str = "127.0.0.1"
+    port: int = 0
+    token: str | None = None
+    certificate: Path | None = None
+    key: Path | None = None
+
+    @property
+    def person(self) -> str:
+        """Name of who sits at the station."""
+        return self.name or getpass.getuser()
+
+    def actor(self) -> Actor:
+        """The person, as the console knows them."""
+        from labeling.commands import Actor
+        from logs.events import Source
+
+        return Actor(self.person, Source.OPERATOR)
+
+    def access(self) -> Access:
+        """How the console is reached.
+
+        Raises:
+            UnsafeAddressError: others could reach it without a token and TLS.
+        """
+        from labeling.access import make_access
+        from labeling.server import free_port
+
+        return make_access(
+            self.host,
+            self.port or free_port(self.host),
+            token=self.token,
+            certificate=self.certificate,
+            key=self.key,
+        )

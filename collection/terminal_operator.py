@@ -6,7 +6,6 @@ console pauses the session: a robot is never left working for nobody.
 
 from __future__ import annotations
 
-import getpass
 import select
 import sys
 import threading
@@ -15,7 +14,6 @@ from collections.abc import Callable
 from typing import TYPE_CHECKING
 
 from labeling.commands import Actor, Command, CommandKind
-from logs.events import Source
 
 if TYPE_CHECKING:
     from collection.progress import SessionProgress
@@ -36,12 +34,20 @@ class TerminalOperator:
 
     Args:
         controller: the session's writer.
+        person: at the terminal.
         link: of the console's server.
         progress: shares the terminal; its lines go into the console while that is open.
     """
 
-    def __init__(self, controller: SessionController, link: str, progress: SessionProgress) -> None:
+    def __init__(
+        self,
+        controller: SessionController,
+        person: Actor,
+        link: str,
+        progress: SessionProgress,
+    ) -> None:
         self._controller = controller
+        self._person = person
         self._link = link
         self._progress = progress
         self._lines: deque[str] = deque(maxlen=100)
@@ -88,8 +94,7 @@ class TerminalOperator:
 
     def _pause(self, session: threading.Thread) -> None:
         """Nothing new starts while nobody looks; Enter opens the console again."""
-        me = Actor(getpass.getuser(), Source.OPERATOR)
-        self._controller.submit(Command(kind=CommandKind.PAUSE), me)
+        self._controller.submit(Command(kind=CommandKind.PAUSE), self._person)
         self._progress.say("paused; Enter opens the console again, Ctrl-C ends the session")
         while session.is_alive() and not self._controller.ending:
             if select.select([sys.stdin], [], [], LOOK_PERIOD)[0]:

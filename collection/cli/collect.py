@@ -7,6 +7,8 @@ from typing import Annotated
 
 import typer
 
+from collection.cli.console_options import LOOPBACK, Certificate, Host, Key, Name, Port, Token
+
 
 def collect(
     out: Annotated[Path, typer.Option("--out", help="The session's folder.")],
@@ -30,6 +32,13 @@ def collect(
     mesh_unit: Annotated[
         str | None, typer.Option(help="Unit of mesh files: m, cm, mm or in. [m]")
     ] = None,
+    models: Annotated[
+        str | None,
+        typer.Option(help="Models whose predictions annotate each trial. [all but dynamic]"),
+    ] = None,
+    min_probability: Annotated[
+        float | None, typer.Option(help="Rarer stable poses are not planned. [0.01]")
+    ] = None,
     resume: Annotated[
         bool, typer.Option("--resume", help="Continue the session in --out.")
     ] = False,
@@ -39,6 +48,12 @@ def collect(
     dry_run: Annotated[
         bool, typer.Option("--dry-run", help="Print the plan; nothing moves, nothing is written.")
     ] = False,
+    name: Name = None,
+    host: Host = LOOPBACK,
+    port: Port = 0,
+    token: Token = None,
+    certificate: Certificate = None,
+    key: Key = None,
     report: Annotated[bool, typer.Option(help="Write report.html at the end.")] = True,
     as_json: Annotated[bool, typer.Option("--json", help="Print the summary as JSON.")] = False,
 ) -> None:
@@ -57,20 +72,28 @@ def collect(
         reach collect --resume --out S
     """
     from collection.conduct import Conduct, conduct, show_plan
+    from collection.options import Sitting
 
     chosen = {
         "station": station,
-        "objects": None if objects is None else tuple(filter(None, objects.split(","))),
+        "objects": _words(objects),
         "grasps": grasps,
         "repeats": repeats,
         "operator": operator,
         "seed": seed,
         "session": session,
         "mesh_unit": mesh_unit,
+        "models": _words(models),
+        "min_probability": min_probability,
     }
     given = {name: value for name, value in chosen.items() if value is not None}
+    sitting = Sitting(name, host, port, token, certificate, key)
+    asked = Conduct(out, given, resume, _words(accept_change) or (), sitting, report, as_json)
     if dry_run:
-        show_plan(given, as_json=as_json)
-        return
-    accepted = tuple(filter(None, accept_change.split(",")))
-    conduct(Conduct(out, given, resume, accepted, report, as_json))
+        show_plan(asked)
+    else:
+        conduct(asked)
+
+
+def _words(text: str | None) -> tuple[str, ...] | None:
+    return None if text is None else tuple(filter(None, map(str.strip, text.split(","))))

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import getpass
 import json
 from contextlib import AbstractContextManager
 from dataclasses import asdict
@@ -10,6 +9,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
+
+from collection.cli.console_options import LOOPBACK, Certificate, Host, Key, Name, Port, Token
 
 if TYPE_CHECKING:
     from labeling.commands import Actor
@@ -20,9 +21,7 @@ def label(
     session: Annotated[
         Path | None, typer.Argument(help="The session's folder; none in practice.")
     ] = None,
-    operator: Annotated[
-        str | None, typer.Option(help="Your name; the login name if absent.")
-    ] = None,
+    name: Name = None,
     second: Annotated[
         bool, typer.Option("--second", help="Label blindly as a second operator, for agreement.")
     ] = False,
@@ -33,15 +32,11 @@ def label(
         bool, typer.Option("--agreement", help="Print the operators' agreement and leave.")
     ] = False,
     as_json: Annotated[bool, typer.Option("--json", help="With --agreement: as JSON.")] = False,
-    host: Annotated[str, typer.Option(help="Address to listen on.")] = "127.0.0.1",
-    port: Annotated[int, typer.Option(min=0, max=65535, help="Port; 0 takes a free one.")] = 0,
-    token: Annotated[
-        str | None, typer.Option(envvar="REACH_CONSOLE_TOKEN", help="Needed beyond this machine.")
-    ] = None,
-    certificate: Annotated[
-        Path | None, typer.Option(help="TLS certificate (PEM), needed beyond this machine.")
-    ] = None,
-    key: Annotated[Path | None, typer.Option(help="The certificate's private key (PEM).")] = None,
+    host: Host = LOOPBACK,
+    port: Port = 0,
+    token: Token = None,
+    certificate: Certificate = None,
+    key: Key = None,
 ) -> None:
     """Replay each trial's recording beside the keys and give it a new verdict.
 
@@ -49,14 +44,12 @@ def label(
     relabel never edits: the newest one counts, and those found through a model are marked.
 
     - `reach label sessions/monday`
-    - `reach label sessions/monday --operator bo --second`
+    - `reach label sessions/monday --name bo --second`
     - `reach label sessions/monday --agreement --json`
     - `reach label --practice`
     """
-    from labeling.access import make_access
-    from labeling.commands import Actor
-    from labeling.server import ConsoleServer, free_port
-    from logs.events import Source
+    from collection.options import Sitting
+    from labeling.server import ConsoleServer
     from reach.errors import InvalidInputError
 
     if practice == (session is not None):
@@ -64,13 +57,10 @@ def label(
     if agreement and session is not None:
         _print_agreement(session, as_json=as_json)
         return
-    actor = Actor(operator or getpass.getuser(), Source.OPERATOR)
-    access = make_access(
-        host, port or free_port(host), token=token, certificate=certificate, key=key
-    )
+    sitting = Sitting(name, host, port, token, certificate, key)
     with (
-        _console(session, actor, second=second) as console,
-        ConsoleServer(console, access) as server,
+        _console(session, sitting.actor(), second=second) as console,
+        ConsoleServer(console, sitting.access()) as server,
     ):
         print(server.link, flush=True)
         print("Ctrl-C ends.", flush=True)

@@ -102,13 +102,15 @@ def main(arguments: Sequence[str] | None = None) -> int:
         )
     except ReachError as error:
         return _complain(str(error), 2)
+    except BrokenPipeError:
+        return 0  # the reader of our output (head, less) has seen enough
+    except OSError as error:
+        return _complain(_of_the_system(error), 2)
     except typer.TyperException as error:
         given = sys.argv[1:] if arguments is None else arguments
         return _complain(_naming_the_value(error.format_message(), given), 2)
     except (typer.Abort, KeyboardInterrupt):
         return _complain("interrupted", 130)
-    except BrokenPipeError:
-        return 0  # the reader of our output (head, less) has seen enough
     return result if isinstance(result, int) else 0
 
 
@@ -123,6 +125,13 @@ def _naming_the_value(message: str, arguments: Sequence[str]) -> str:
     joined = {a.partition("=")[0]: a.partition("=")[2] for a in arguments if "=" in a}
     typed = {**joined, **following}.get(option[1])
     return message if typed is None or typed in message else f"{message} (given: {typed})"
+
+
+def _of_the_system(error: OSError) -> str:
+    """What the operating system refused: a folder that cannot be written, a full disk."""
+    if error.filename is None or error.strerror is None:
+        return str(error)
+    return f"{error.filename}: {error.strerror.lower()}"
 
 
 def _complain(message: str, code: int) -> int:

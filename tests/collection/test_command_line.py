@@ -39,6 +39,10 @@ def collect(out, **options):
         ({"grasps": "0"}, ["--grasps", "0"]),
         ({"grasps": "many"}, ["many"]),
         ({"accept_change": "calibration"}, ["--resume"]),
+        ({"models": "reach,guess"}, ["--models", "guess", "settled-robust"]),
+        ({"min_probability": "1.5"}, ["--min-probability", "1.5"]),
+        ({"operator": "web", "host": "0.0.0.0"}, ["0.0.0.0", "token"]),
+        ({"station": "yumi"}, ["auto", "yumi", "web"]),
     ],
 )
 def test_bad_input_is_refused_in_one_line(capsys, tmp_path, options, named):
@@ -47,6 +51,12 @@ def test_bad_input_is_refused_in_one_line(capsys, tmp_path, options, named):
     for word in named:
         assert word in line
     assert list(tmp_path.iterdir()) == []
+
+
+def test_a_dry_run_refuses_what_the_session_would_refuse(capsys, tmp_path):
+    assert "yumi" in refused(capsys, *collect(tmp_path / "S", station="yumi"), "--dry-run")
+    assert "exists" in refused(capsys, *collect(tmp_path), "--dry-run")
+    assert "status" in refused(capsys, *collect(tmp_path), "--dry-run", "--resume")
 
 
 def test_an_existing_folder_is_not_written_to(capsys, tmp_path):
@@ -94,6 +104,16 @@ def test_help_names_every_command(capsys):
     assert main(["--help"]) == 0
     told = capsys.readouterr().out
     assert all(name in told for name in COMMANDS)
+
+
+@pytest.mark.parametrize("out", ["/proc/nowhere/S", "/dev/null/S"])
+def test_a_folder_that_cannot_be_written_is_named(capsys, out):
+    assert out.rpartition("/")[0] in refused(capsys, *collect(out))
+
+
+def test_objects_are_not_exported_below_a_file(capsys, tmp_path):
+    (tmp_path / "file").write_text("")
+    assert str(tmp_path / "file") in refused(capsys, "objects", "--export", tmp_path / "file" / "x")
 
 
 def test_version_is_printed(capsys):

@@ -73,7 +73,7 @@ def test_pose_error_and_seed_reach_the_robust_models(tmp_path):
         ([CUBE_GRASP, (2 * np.eye(4)).tolist()], (), "grasp 1: T_object_gripper"),
         ({"grasps": [{"pose": 1}]}, (), "grasps.0.T_object_gripper"),
         ([CUBE_GRASP], ("--models", "best"), "unknown model 'best'"),
-        ([CUBE_GRASP], ("--pose-error", "3"), "expected metres,radians"),
+        ([CUBE_GRASP], ("--pose-error", "3"), "expected meters,radians"),
         ([CUBE_GRASP], ("--force", "-1"), "grasp 0: closing force"),
         ({"gripper": "hand", "grasps": [{"T_object_gripper": CUBE_GRASP}]}, (), "gripper 'hand'"),
     ],

@@ -71,7 +71,7 @@ def relabel(client: httpx.Client, item: dict[str, Any], kind: str, **value: Any)
 def test_a_recorded_session_is_relabeled_and_left_as_it_ended(bench: Any, start: Any) -> None:
     bench.labelled("success")
     bench.controller.close("finished")
-    process, client = start(str(bench.folder.path), "--operator", "bo")
+    process, client = start(str(bench.folder.path), "--name", "bo")
     item = client.get("/api/review").json()["trials"][0]
     answer = relabel(client, item, "relabel", outcome="failure", reason="other", note="slow look")
     assert answer["status"] == "stored"
@@ -90,7 +90,7 @@ def test_a_second_operator_labels_blindly_and_agreement_is_printed(bench: Any, s
     bench.labelled("success")
     bench.labelled("failure", reason="missed")
     bench.controller.close("finished")
-    process, client = start(str(bench.folder.path), "--operator", "bo", "--second")
+    process, client = start(str(bench.folder.path), "--name", "bo", "--second")
     for item in client.get("/api/review").json()["trials"]:
         assert item["label"] is None
         assert relabel(client, item, "second_label", outcome="success")["status"] == "stored"
