@@ -17,6 +17,7 @@ import numpy as np
 import rerun as rr
 
 from logs import session_blueprint as layout
+from logs import view_colors as colors
 from logs.annotation_files import read_annotations
 from logs.annotations import ScoreRecord
 from logs.errors import RecordReadError, ViewError
@@ -42,7 +43,8 @@ from logs.view_text import escaped, summary
 APPLICATION = "reach-trials session"
 PICTURES = 300
 """Only this many trials, worst disagreements first, carry a picture: it must be decoded."""
-PICTURE_WIDTH = 400
+PICTURE_SIZE = (400, 300)
+"""Of all pictures [pixel]: the viewer reports an error when a picture's size changes."""
 _NO_TRIANGLE = np.zeros((1, 3, 3))
 """Drawn where there is no contact: a viewer that loads a file piece by piece ignores `Clear`."""
 
@@ -173,7 +175,7 @@ def _picture(path: Path) -> bytes | None:
         near, far = np.nanpercentile(depth, [2, 98]) if np.isfinite(depth).any() else (0.0, 1.0)
         shade = np.nan_to_num((far - depth) / max(far - near, 1e-6), nan=0.0).clip(0, 1)
         image = Image.fromarray((shade * 255).astype(np.uint8), "L")
-    image.thumbnail((PICTURE_WIDTH, PICTURE_WIDTH))
+    image.thumbnail(PICTURE_SIZE)
     return _jpeg(image)
 
 
@@ -182,13 +184,19 @@ def _no_picture() -> bytes:
     """What stands where a step has no picture."""
     from PIL import Image, ImageDraw
 
-    image = Image.new("RGB", (PICTURE_WIDTH, PICTURE_WIDTH // 2), (24, 27, 33))
-    text = f"no picture here: only the first {PICTURES} steps by disagreement have one"
-    ImageDraw.Draw(image).text((12, 90), text, fill=(150, 156, 168))
+    image = Image.new("RGB", PICTURE_SIZE, colors.BACKGROUND[:3])
+    text = f"only the first {PICTURES} steps by disagreement have a picture"
+    ImageDraw.Draw(image).text((16, 140), text, fill=colors.JOINTED[:3])
     return _jpeg(image)
 
 
 def _jpeg(image: Any) -> bytes:
+    """An image in the middle of a picture of the one size."""
+    from PIL import Image
+
+    canvas = Image.new("RGB", PICTURE_SIZE, colors.BACKGROUND[:3])
+    width, height = image.size
+    canvas.paste(image, ((PICTURE_SIZE[0] - width) // 2, (PICTURE_SIZE[1] - height) // 2))
     buffer = io.BytesIO()
-    image.save(buffer, "jpeg", quality=85)
+    canvas.save(buffer, "jpeg", quality=85)
     return buffer.getvalue()

@@ -1,5 +1,6 @@
 """The session's view: all trials in one recording, disagreements first."""
 
+import io
 from pathlib import Path
 
 import numpy as np
@@ -138,15 +139,21 @@ def test_every_step_sets_whatever_any_step_sets(
     session: SessionFolder, tmp_path: Path, monkeypatch
 ) -> None:
     """Else, in another order, a step would show what an earlier one left behind."""
+    from PIL import Image
     from rerun.chunk import RrdReader
 
     monkeypatch.setattr("logs.session_view.PICTURES", 2)
     steps: dict[str, set[int]] = {}
+    sizes = set()
     for chunk in RrdReader(str(write_session_view(session.path, tmp_path / "all.rrd"))).stream():
         batch = chunk.to_record_batch()
         if "by_outcome" in batch.schema.names:
             found = steps.setdefault(str(chunk.entity_path), set())
             found |= set(batch.column("by_outcome").to_pylist())
+        if "EncodedImage:blob" in batch.schema.names:
+            blobs = batch.column("EncodedImage:blob").to_pylist()
+            sizes |= {Image.open(io.BytesIO(bytes(blob[0]))).size for blob in blobs}
+    assert sizes == {(400, 300)}  # the viewer reports a change of size as an error
     assert {"/picture", "/scene/contacts/pressure", "/scene/contacts/force"} <= set(steps)
     assert {entity for entity, found in steps.items() if found != {1, 2, 3, 4, 5}} == set()
 
