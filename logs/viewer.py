@@ -25,6 +25,18 @@ START_SECONDS = 30.0
 _ENDED_BY_USER = (0, -2, 130)
 
 
+def viewer_program() -> str:
+    """The viewer itself: its Python starter swallows exit codes, and passes no signal on.
+
+    Raises:
+        ViewError: if it is not installed.
+    """
+    package = importlib.util.find_spec("rerun_cli")
+    if package is None or package.origin is None:
+        raise ViewError("the Rerun viewer is not installed: pip install rerun-sdk")
+    return os.environ.get("RERUN_CLI_PATH") or str(Path(package.origin).with_name("rerun"))
+
+
 def show_recordings(paths: Sequence[Path], environment: Mapping[str, str] | None = None) -> None:
     """Open recordings and wait until the viewer is closed.
 
@@ -148,20 +160,12 @@ class WebViewer:
 def _start(
     options: Sequence[str], paths: Sequence[Path], env: Mapping[str, str], *, quiet: bool = False
 ) -> subprocess.Popen[bytes]:
-    command = [_program(), *options, *map(str, paths)]
+    command = [viewer_program(), *options, *map(str, paths)]
     out = subprocess.DEVNULL if quiet else None
     try:
         return subprocess.Popen(command, env=dict(env), stdout=out, stderr=out)
     except OSError as error:
         raise ViewError(f"the Rerun viewer does not start: {error}") from error
-
-
-def _program() -> str:
-    """The viewer itself: its Python starter would die of a signal without passing it on."""
-    package = importlib.util.find_spec("rerun_cli")
-    if package is None or package.origin is None:
-        raise ViewError("the Rerun viewer is not installed: pip install rerun-sdk")
-    return os.environ.get("RERUN_CLI_PATH") or str(Path(package.origin).with_name("rerun"))
 
 
 def _free_port(wanted: int) -> int:

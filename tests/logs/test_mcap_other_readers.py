@@ -1,5 +1,8 @@
 """Other people's readers open every file: the stock MCAP reader, and Rerun's importer."""
 
+import re
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
@@ -9,6 +12,7 @@ from mcap_protobuf.decoder import DecoderFactory
 from logs import topics
 from logs.recorder import TrialRecorder
 from logs.salvage import salvage
+from logs.viewer import viewer_program
 
 
 @pytest.fixture(scope="module")
@@ -59,3 +63,44 @@ def test_rerun_imports_every_file(files: list[Path]) -> None:
             assert {"/camera/depth/depth", "/camera/color/color", "/tf", "/gripper/jaw"} <= entities
         else:
             assert "/annotation/log" in entities
+
+
+def test_rerun_s_checker_finds_no_fault(files: list[Path]) -> None:
+    for path in files:
+        command = [viewer_program(), "mcap", "check", "--full", str(path)]
+        done = subprocess.run(command, capture_output=True, text=True, check=False)
+        assert done.returncode == 0, done.stdout + done.stderr
+        rows = re.findall(r"^(\w+) +\d+ +\d+ +(/\S+)", done.stdout, re.MULTILINE)
+        assert len(rows) >= 2 and {status for status, _ in rows} == {"ok"}, done.stdout
+
+
+def test_rerun_s_checker_would_find_one(files: list[Path], tmp_path: Path) -> None:
+    cut = tmp_path / "cut.mcap"
+    cut.write_bytes(files[0].read_bytes()[:-15_000])
+    command = [viewer_program(), "mcap", "check", "--full", str(cut)]
+    assert subprocess.run(command, capture_output=True, check=False).returncode != 0
+
+
+def test_the_script_of_the_manual_reads_a_take(fixtures: Path) -> None:
+    manual = Path(__file__).parents[2] / "docs" / "records.md"
+    (script,) = re.findall(r"```python\n(.*?)```", manual.read_text(), re.DOTALL)
+    assert len([line for line in script.splitlines() if line]) <= 10
+    done = subprocess.run(
+        [sys.executable, "-c", script, str(fixtures / "record_v1")],
+        capture_output=True, text=True, check=True,
+    )  # fmt: skip
+    for words in ("trial.mcap", "reach_trials.v1.Execution", 'sensor_verdict: "held"',
+                  "annotation.001.mcap", 'outcome: "success"', 'model: "reach"'):  # fmt: skip
+        assert words in done.stdout, words
+
+
+def test_the_manual_names_every_channel(files: list[Path]) -> None:
+    manual = (Path(__file__).parents[2] / "docs" / "records.md").read_text()
+    for path in files:
+        with path.open("rb") as stream:
+            summary = make_reader(stream).get_summary()
+        assert summary is not None
+        for channel in summary.channels.values():
+            pieces = channel.topic.split("/")
+            name = f"/{pieces[3]}`" if pieces[1] == "camera" else f"`{channel.topic}`"
+            assert name in manual or f"`/camera/NAME/{pieces[-1]}`" in manual, channel.topic

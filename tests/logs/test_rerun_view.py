@@ -4,7 +4,6 @@ import json
 import os
 import shutil
 import subprocess
-import sys
 from pathlib import Path
 from types import ModuleType
 
@@ -23,6 +22,7 @@ from logs.view_colors import pressure_colors
 from logs.view_eyes import turned_to_hand
 from logs.view_object import object_track
 from logs.view_text import summary
+from logs.viewer import viewer_program
 from reach.transforms import exp
 
 
@@ -180,9 +180,12 @@ def test_a_copied_take_s_view_is_not_trusted_blindly(take: Path, tmp_path: Path)
 
 
 def test_rerun_accepts_the_file(take: Path) -> None:
-    command = [sys.executable, "-m", "rerun_cli", "rrd", "verify", str(derive_rrd(take))]
+    view = derive_rrd(take)
+    command = [viewer_program(), "rrd", "verify", str(view)]
     done = subprocess.run(command, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stdout + done.stderr
+    view.write_bytes(view.read_bytes()[:-500])
+    assert subprocess.run(command, capture_output=True, check=False).returncode != 0
 
 
 def test_a_record_with_nothing_but_its_start_is_shown(made, tmp_path: Path) -> None:
