@@ -131,3 +131,22 @@ def moved(
         for j in range(3):
             result[i, 3] -= result[i, j] * com[j]
     return result
+
+
+@compiled
+def motion_between(A: FloatArray, B: FloatArray, com: FloatArray) -> tuple[float, float]:
+    """Translation of the center of mass [m] and rotation [rad] of a part seen from the gripper.
+
+    Args:
+        A: T_object_gripper before, shape (4, 4).
+        B: after.
+        com: center of mass, object frame, shape (3,).
+    """
+    squares, trace = 0.0, 0.0
+    for i in range(3):
+        difference = 0.0
+        for j in range(3):
+            difference += B[j, i] * (com[j] - B[j, 3]) - A[j, i] * (com[j] - A[j, 3])
+            trace += A[j, i] * B[j, i]
+        squares += difference * difference
+    return np.sqrt(squares), np.arccos(min(1.0, max(-1.0, 0.5 * (trace - 1.0))))

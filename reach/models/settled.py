@@ -1,13 +1,14 @@
 """Contact with preload and settling: close, press, balance, settle, lift.
 
-1. *Close and press.* Each pad is an elastic foundation, pressure p = k_w delta, pressed on until
-   it pushes back along the closing axis with the closing force f_C. The jaws travel together and
+1. *Close.* The jaw that touches first pushes the part over the table until the other touches too.
+2. *Press.* Each pad is an elastic foundation, a bed of columns that push with k_w delta along the
+   closing axis, pressed on until their sum is the closing force f_C. The jaws travel together and
    the part follows along the closing axis, so that each pad can be pressed on its own.
-2. *Balance.* The normal forces are those of the closed jaws, not free. What they leave unbalanced
+3. *Balance.* The normal forces are those of the closed jaws, not free. What they leave unbalanced
    must be balanced by friction, an ellipsoidal limit surface for each element of surface.
-3. *Settle.* While the part lies on the table it slides and yaws along what friction cannot
+4. *Settle.* While the part lies on the table it slides and yaws along what friction cannot
    balance, as long as that releases more energy than friction consumes.
-4. *Lift.* The weight is added, and the part may still tilt and slide between the pads.
+5. *Lift.* The weight is added, and the part may still tilt and slide between the pads.
 
 The equations, and what was tried and dropped, are in docs/decisions/0090.
 """
@@ -24,7 +25,7 @@ from reach.contact import REASONS, ContactPatch
 from reach.grasp import Grasp
 from reach.kernels.compiling import announced_compilation
 from reach.kernels.pads import Pads, pads_of
-from reach.kernels.settle import FEATURES, MOST_LIFT_STEPS, MOST_STEPS, judge_settling
+from reach.kernels.settle import FEATURES, MOST_POSES, judge_settling
 from reach.kernels.tree import MeshTree, mesh_tree
 from reach.models.base import (
     MARGIN_CAP,
@@ -87,7 +88,7 @@ class SettledContact(CompiledModel):
     stiffness: float = FOUNDATION_STIFFNESS
     margin_cap: float = MARGIN_CAP
     name: ClassVar[str] = "settled"
-    version: ClassVar[str] = "1"
+    version: ClassVar[str] = "2"
 
     def __post_init__(self) -> None:
         positive(self.friction, "friction", zero_allowed=True)
@@ -120,7 +121,7 @@ class SettledContact(CompiledModel):
             float(told.margin[0]),
             REASON_OF[int(told.fate[0])],
             tuple(jaw for jaw in range(missing.bit_length()) if missing >> jaw & 1),
-            lambda: settled_patches(scene, settled, depths),
+            lambda: settled_patches(scene, settled, depths, self.friction),
             settlement,
         )
 
@@ -145,7 +146,7 @@ class SettledContact(CompiledModel):
         # The kernel is compiled for writable arrays; grasps carry read-only ones.
         T = np.array(batch.T_object_gripper[part])
         count, jaws = len(T), len(pads.edges)
-        poses = np.empty((MOST_STEPS + MOST_LIFT_STEPS + 4 if path else 0, 4, 4))
+        poses = np.empty((MOST_POSES if path else 0, 4, 4))
         margin, area = np.zeros(count), np.zeros((count, jaws))
         fate, missing = np.zeros(count, np.int64), np.zeros(count, np.int64)
         features = np.zeros((count, FEATURES + jaws))
@@ -187,7 +188,7 @@ class SettledContact(CompiledModel):
 
 def _settlement(scene: Scene, grasp: Grasp, told: Settled) -> Settlement:
     T_world_gripper = scene.T_world_object @ grasp.T_object_gripper
-    _, translation, yaw, preload, area, inside, lift = told.features[0, :FEATURES]
+    _, translation, yaw, preload, area, inside, lift, pushed = told.features[0, :FEATURES]
     return Settlement(
         FATES[int(told.fate[0])],
         float(translation),
@@ -198,6 +199,7 @@ def _settlement(scene: Scene, grasp: Grasp, told: Settled) -> Settlement:
         float(area),
         float(inside),
         float(lift),
+        float(pushed),
     )
 
 

@@ -66,4 +66,4 @@ def quantities(gripper: ParallelJawGripper, told: Settled) -> FloatArray:
     return np.array([1.0, log_odds, inside.mean()])
 
 
-GRADE = Grade(offset=-1.17, share=0.71, inside=4.66)
+GRADE = Grade(offset=-1.39, share=0.76, inside=4.99)

@@ -95,6 +95,8 @@ def _details(verdict: SettledVerdict) -> dict[str, Any]:
         "explanation": verdict.explanation,
         "translation": settlement.translation,
         "yaw": settlement.yaw,
+        "pushed": settlement.pushed,
+        "lift_motion": settlement.lift_motion,
         "preload_share": settlement.preload_share,
         "path": settlement.thinned().tolist(),  # T_world_object
     }

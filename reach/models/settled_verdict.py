@@ -24,6 +24,8 @@ class Fate(StrEnum):
 FATES = tuple(Fate)
 REASON_OF = (Reason.HOLDS, Reason.NO_CONTACT, Reason.SLIPS, Reason.SLIPS, Reason.SLIPS)
 """Reason of each fate."""
+PUSHED = 1e-4
+"""A push is told from here on [m]."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -32,7 +34,8 @@ class Settlement:
 
     Attributes:
         fate: how it ended.
-        translation: of the center of mass while the table carried the part [m].
+        translation: of the center of mass while the table carried the part [m], seen from the
+            hand; a part off the middle is brought there.
         yaw: rotation about the table's normal in that time [rad].
         path: T_world_object at every step, as if the hand had not risen, shape (P, 4, 4).
         rest: index in `path` of the pose in which the lift began.
@@ -40,6 +43,7 @@ class Settlement:
         area: of the lesser jaw's patch at the pad's deformable depth [m^2].
         inside: distance of the pressures' centers from the pads' outline, the lesser [m].
         lift_motion: of the part in the hand while it was lifted [m].
+        pushed: the translation until the second jaw touched [m].
     """
 
     fate: Fate
@@ -51,6 +55,7 @@ class Settlement:
     area: float
     inside: float
     lift_motion: float
+    pushed: float
 
     @property
     def T_world_object(self) -> FloatArray:
@@ -59,7 +64,19 @@ class Settlement:
         return pose
 
     def thinned(self, most: int = 12) -> FloatArray:
-        """At most so many poses of the path, first, rest and last among them, shape (K, 4, 4)."""
+        """Poses of the path for a drawing: `details.path` of a score, and the view's ghosts.
+
+        Each is a T_world_object, 4 rows of 4 numbers in meters, in the order in which the part
+        takes them: first where it lay when the jaws began to close; last where it ended, as if the
+        hand had not risen. The pose in which the lift begins is always one of them. A part that
+        never moves has one.
+
+        Args:
+            most: number of poses, at least 3.
+
+        Returns:
+            Shape (K, 4, 4), 1 <= K <= most.
+        """
         count = len(self.path)
         kept = np.linspace(0, count - 1, min(most - 1, count)).round().astype(int)
         chosen: FloatArray = self.path[np.unique(np.append(kept, self.rest))]
@@ -77,13 +94,18 @@ class SettledVerdict(Verdict):
         """One sentence for a person."""
         if self.settlement is None or self.settlement.fate is Fate.NO_CONTACT:
             return super().explanation
-        path = self.settlement
-        way = f"{path.translation * 1e3:.1f} mm and {np.degrees(path.yaw):.1f} deg"
-        if path.fate is Fate.SQUEEZED_OUT:
-            return f"squeezed out of the jaws after {way}"
-        if path.fate is Fate.STILL_SLIDING:
+        told = self.settlement
+        way = f"{told.translation * 1e3:.1f} mm and {np.degrees(told.yaw):.1f} deg"
+        if told.pushed > PUSHED:
+            way += f" ({told.pushed * 1e3:.1f} mm by the jaw that touches first)"
+        if told.fate is Fate.SQUEEZED_OUT:
+            lost = " and ".join(map(str, self.missing_jaws))
+            return f"squeezed out of the jaws after {way}: lost on jaw {lost}"
+        if told.fate is Fate.STILL_SLIDING:
             return f"still sliding after {way}"
-        stood = "rests as it lay" if len(path.path[: path.rest + 1]) == 1 else f"settles by {way}"
-        if path.fate is Fate.SLIPPED_ON_LIFT:
-            return f"{stood}, slips on the lift: carries {self.margin:.3g} of the part's weight"
+        stood = f"settles by {way}" if told.rest else "rests as it lay"
+        if told.fate is Fate.SLIPPED_ON_LIFT:
+            if self.missing_jaws:
+                return f"{stood}, slips on the lift: lost after {told.lift_motion * 1e3:.1f} mm"
+            return f"{stood}, still slips after {told.lift_motion * 1e3:.1f} mm of the lift"
         return f"{stood}, holds {self.margin:.3g} times gravity"

@@ -172,7 +172,7 @@ def test_robust_score_is_graded_reproducible_and_rises_with_a_better_hold():
 def told(held, inside):
     """Settled samples of which some hold, all pressed at one distance inside the outline [m]."""
     count = len(held)
-    features = np.zeros((count, 9))
+    features = np.zeros((count, 10))
     features[:, 5] = inside
     nothing = np.zeros(count, np.int64)
     margin = np.where(held, 10.0, 0.0)

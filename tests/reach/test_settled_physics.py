@@ -6,6 +6,13 @@ import trimesh
 
 from reach import Grasp, GraspObject, ParallelJawGripper, Scene, SettledContact, transforms
 from reach.contact import Reason
+from reach.gripper import Jaw
+from reach.kernels.pads import pads_of
+from reach.kernels.settle_contact import dragged
+from reach.kernels.settle_motion import motions_on_table
+from reach.kernels.settle_push import gyration_about, push, spread_about
+from reach.kernels.settle_room import Hand, make_room
+from reach.kernels.tree import mesh_tree
 from reach.models.settled import FOUNDATION_STIFFNESS
 from reach.models.settled_verdict import Fate
 from reach.raycast import RaycastScene
@@ -71,14 +78,19 @@ def test_low_friction_lets_a_turned_cube_align():
     assert "settles by" in verdict.explanation
 
 
-def test_high_friction_jams_a_turned_cube_where_it_lies():
-    """Two opposite edges at 45 - 20 degrees to the closing axis jam, as two points, above a friction
-    of tan 25 deg = .47; soft pads press beside the edges as well, and jam above .41."""
-    verdict = judged(cube(), from_above(np.radians(20)), friction=0.5)
+@pytest.mark.parametrize(("friction", "turned"), [(0.3, True), (0.5, True), (0.8, False)])
+def test_friction_decides_whether_a_turned_cube_aligns_or_jams(friction, turned):
+    """As two points, opposite edges 25 degrees off the closing axis jam above tan 25 deg = .47. A
+    soft pad lies on the face beside the edge too and turns the cube on up to about .55; so does
+    the pin world. Above, it rests as it lay."""
+    verdict = judged(cube(), from_above(np.radians(20)), friction=friction)
     assert verdict.resists
-    assert np.degrees(verdict.settlement.yaw) < 2
-    assert "rests as it lay" in verdict.explanation
     assert verdict.settlement.preload_share < 1
+    if turned:
+        assert np.degrees(verdict.settlement.yaw) > 13
+    else:
+        assert np.degrees(verdict.settlement.yaw) < 1
+        assert "rests as it lay" in verdict.explanation
 
 
 def test_a_cube_at_45_degrees_is_held_on_its_edges():
@@ -107,7 +119,9 @@ def test_a_wedges_preload_is_that_of_two_inclined_planes():
     total = sum(patch.force_object for patch in verdict.patches)
     # The jaws come from both sides, so that only the push toward the thick end is left.
     assert total[0] == pytest.approx(0.0, abs=1e-6)
-    assert total[1] == pytest.approx(-2 * FORCE * np.tan(angle), rel=1e-3)
+    # Within the friction angle the pads' columns stick and push along the closing axis with f_C
+    # alone: f_C cos of it is pressure, cos sin across, and friction balances just that.
+    assert total[1] == pytest.approx(-2 * FORCE * np.cos(angle) * np.sin(angle), rel=1e-3)
     assert verdict.settlement.preload_share == pytest.approx(np.tan(angle) / 0.4, rel=0.03)
 
 
@@ -134,13 +148,75 @@ def test_a_frictionless_ball_stays_on_the_table_and_is_not_lifted():
     assert cut.settlement.fate is Fate.SQUEEZED_OUT
 
 
-def test_jaws_off_center_along_the_closing_axis_change_nothing():
-    """The jaws are coupled: the part shifts until both press."""
-    reference = judged(cube(), from_above(np.radians(10)), friction=0.3)
+@pytest.mark.parametrize("part", [cube(), cylinder()], ids=["cube", "cylinder"])
+def test_jaws_off_center_along_the_closing_axis_bring_the_part_to_the_middle(part):
+    """The jaws are coupled: the part is pushed until both touch, and nothing else changes."""
+    reference = judged(part, from_above(), friction=0.3)
     for x in (-0.008, 0.003, 0.008):
-        shifted = judged(cube(), from_above(np.radians(10), x=x), friction=0.3)
-        assert shifted.settlement.yaw == pytest.approx(reference.settlement.yaw, rel=1e-6)
-        assert shifted.margin == pytest.approx(reference.margin, rel=1e-6)
+        shifted = judged(part, from_above(x=x), friction=0.3)
+        assert shifted.settlement.pushed == pytest.approx(abs(x), abs=1e-4)
+        assert shifted.settlement.path[-1][0, 3] == pytest.approx(x, abs=1e-4)
+        assert shifted.settlement.yaw == pytest.approx(reference.settlement.yaw, abs=5e-3)
+        assert shifted.margin == pytest.approx(reference.margin, rel=1e-2)
+        assert "touches first" in shifted.explanation
+
+
+def test_the_jaw_that_touches_first_turns_a_part_that_both_would_jam():
+    flush = judged(cube(), from_above(np.radians(20), x=0.006), friction=0.3)
+    assert np.degrees(flush.settlement.yaw) == pytest.approx(20, abs=3.5)
+    jammed = judged(cube(), from_above(np.radians(20)), friction=0.8)
+    turned = judged(cube(), from_above(np.radians(20), x=0.006), friction=0.8)
+    assert np.degrees(jammed.settlement.yaw) < 1 < 4 < np.degrees(turned.settlement.yaw)
+    assert turned.settlement.pushed > 0.005
+
+
+def test_a_part_pushed_at_a_lever_turns_as_its_radius_of_gyration_says():
+    """Without friction on the pad: a travel s at a lever r turns by s r / (k^2 + r^2)."""
+    part, yaw, edge, travel = cube(), np.radians(20), 0.03, 1e-4
+    points, _ = trimesh.sample.sample_surface(
+        trimesh.Trimesh(part.vertices, part.faces), 20000, seed=1
+    )
+    square = (points[:, :2] ** 2).sum(axis=1).mean()
+    lever = edge / np.sqrt(2) * np.sin(np.radians(45) - yaw)
+    expected = travel * lever / (square + lever**2)
+    pads, tree = pads_of(YUMI), mesh_tree(part)
+    T = np.array(from_above(yaw, x=travel).T_object_gripper)
+    up = T[:3, :3].T @ (0.0, 0.0, 1.0)
+    hand = Hand(np.zeros(3), FORCE, 0.0, FOUNDATION_STIFFNESS, 0.03)
+    gyration = gyration_about(spread_about(tree, np.zeros(3)), np.array([0.0, 0.0, 1.0]))
+    assert gyration**2 == pytest.approx(square, rel=0.02)
+    after, poses = push(
+        tree, pads, T, hand, motions_on_table(up, np.array([1.0, 0.0, 0.0])), gyration,
+        make_room(2), np.empty((0, 4, 4)), 1,
+    )  # fmt: skip
+    assert poses > 1
+    angle = np.arccos(np.clip((np.trace(after[:3, :3].T @ T[:3, :3]) - 1) / 2, -1, 1))
+    assert angle == pytest.approx(expected, rel=0.1)
+
+
+def test_jaws_that_close_on_nothing_from_one_side_stop_in_the_middle():
+    """The pad of one jaw is shifted past the part, so that only the other can push."""
+    first, second = YUMI.jaws
+    aside = transforms.make_transform(np.eye(3), (0.0, 0.045, 0.0))
+    moved = Jaw(second.pad, aside @ second.T_gripper_pad_open)
+    gripper = ParallelJawGripper("askew", (first, moved), 0.025, 20.0, 0.02)
+    scene = Scene(cylinder(), gripper, np.eye(4))
+    verdict = SettledContact().evaluate(scene, from_above())
+    assert verdict.settlement.fate is Fate.NO_CONTACT and not verdict.resists
+    assert verdict.settlement.pushed == pytest.approx(0.012, abs=1e-3)
+
+
+@pytest.mark.parametrize("friction", [0.0, 0.3, 0.7])
+def test_a_column_on_a_slope_pushes_with_its_stiffness_along_the_closing_axis(friction):
+    """Pressure and friction on a slope, seen along and across the axis of the column."""
+    for slope in np.radians([0, 5, 20, 40, 70, 85]):
+        pressure, area = dragged(np.cos(slope), friction), 1 / np.cos(slope)
+        rub = min(friction * pressure, np.sin(slope) * np.cos(slope))
+        along = (pressure * np.cos(slope) + rub * np.sin(slope)) * area
+        across = (pressure * np.sin(slope) - rub * np.cos(slope)) * area
+        assert along == pytest.approx(1.0)
+        sticks = np.tan(slope) <= friction
+        assert across == pytest.approx(0.0, abs=1e-12) if sticks else across > 0
 
 
 def test_the_lift_adds_the_weight():
