@@ -21,9 +21,11 @@ from pathlib import Path
 import numpy as np
 from scipy import stats
 
+from benchmarks.registration_holdout import KINDS, holdout_part
 from benchmarks.registration_objects import PARTS, part
 from benchmarks.registration_rivals import METHODS
 from benchmarks.registration_scenes import CAMERAS, RegistrationCase, SceneSettings, make_case
+from collection.objects import load_object
 from reach import GraspObject
 from reach.arrays import FloatArray
 from reach.stable_poses import stable_poses
@@ -64,7 +66,12 @@ class Row:
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--parts", default=",".join(PARTS), help="names, or mesh files")
+    parser.add_argument(
+        "--parts", default=",".join(PARTS), help="names, built-in parts, or mesh files"
+    )
+    parser.add_argument(
+        "--holdout", type=int, help="instead: parts of every kind drawn anew from this seed"
+    )
     parser.add_argument("--poses", type=int, default=10)
     parser.add_argument("--sensors", default=",".join(CAMERAS))
     parser.add_argument("--seed", type=int, default=1000)
@@ -72,7 +79,10 @@ def main() -> None:
     parser.add_argument("--only-ours", action="store_true")
     parser.add_argument("--out", type=Path, default=Path("benchmarks/results/registration.json"))
     arguments = parser.parse_args()
-    objects = [_object(name) for name in arguments.parts.split(",")]
+    if arguments.holdout is None:
+        objects = [_object(name) for name in arguments.parts.split(",")]
+    else:
+        objects = [holdout_part(kind, arguments.holdout) for kind in KINDS]
     rows: list[Row] = []
     wrong: dict[str, dict[str, int]] = {}
     for sensor in arguments.sensors.split(","):
@@ -84,6 +94,7 @@ def main() -> None:
                 if not arguments.only_ours:
                     rows += _rivals(case, k)
         _print_table(rows, sensor)
+        _print_parts(rows, sensor)
         wrong[sensor] = _wrong_meshes(objects, sensor, arguments.wrong, arguments.seed)
         print(f"wrong mesh: {wrong[sensor]}\n", flush=True)
     arguments.out.parent.mkdir(parents=True, exist_ok=True)
@@ -92,7 +103,7 @@ def main() -> None:
 
 
 def _object(name: str) -> GraspObject:
-    return part(name) if name in PARTS else GraspObject.load(name, mass=0.05)
+    return part(name) if name in PARTS else load_object(name, mass=0.05)
 
 
 def _ours(case: RegistrationCase, k: int) -> list[Row]:
@@ -243,6 +254,21 @@ def _print_table(rows: list[Row], sensor: str) -> None:
                 f"    {_share([row.within90 for row in right])}"
             )
         print(line)
+
+
+def _print_parts(rows: list[Row], sensor: str) -> None:
+    """Ours, part by part, all modes together."""
+    print(f"{'part':24s} cases strict right acc. wrong acc. asked refused")
+    ours = [row for row in rows if row.sensor == sensor and row.method in OURS]
+    for name in dict.fromkeys(row.part for row in ours):
+        mine = [row for row in ours if row.part == name]
+        print(
+            f"{name:24s} {len(mine):5d} {_share([row.strict for row in mine])}     "
+            f"{_share([row.accepted for row in mine if row.strict])}"
+            f"      {sum(row.accepted and not row.strict for row in mine):4d} "
+            f"{sum(not row.accepted and not row.refused for row in mine):5d} "
+            f"{sum(row.refused for row in mine):7d}"
+        )
 
 
 def _share(flags: list[bool]) -> str:

@@ -198,28 +198,13 @@ def _correlation_area(frame: DepthFrame, normal: FloatArray, offset: float, nois
     residual = middle * slope - offset
     residual[~(np.abs(residual) < 3 * noise)] = np.nan
     variance = float(np.nanmean(residual**2)) if np.isfinite(residual).any() else 1.0
-    correlation: list[float] = []
+    line = 1.0
     for lag in range(1, reach + 1):
         product = residual[:, lag:] * residual[:, :-lag]
         if not np.isfinite(product).any():
             break
-        value = float(np.nanmean(product)) / variance
-        if value < 0.05:
+        correlation = float(np.nanmean(product)) / variance
+        if correlation < 0.05:
             break
-        correlation.append(value)
-    return _area(correlation)
-
-
-def _area(correlation: list[float]) -> float:
-    """Sum of a mixture of white and smooth noise's autocorrelation over the plane [pixel].
-
-    The smooth noise's share is where its correlation, taken for Gaussian, would be at lag 0.
-
-    Args:
-        correlation: along a line, at lags 1, 2, ..., as far as there is any.
-    """
-    share = 1.0
-    if len(correlation) > 1:
-        share = min(1.0, correlation[0] * max(1.0, correlation[0] / correlation[1]) ** (1 / 3))
-    line = 1.0 + 2.0 * sum(correlation) / share
-    return 1.0 + share * (line**2 - 1.0)
+        line += 2.0 * correlation
+    return line**2

@@ -7,13 +7,13 @@ the part's place is not known. So such turns are sought on purpose, about the be
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 
 from reach.arrays import FloatArray, IntArray
 from reach.stable_poses import StablePose
-from reach.symmetry import Symmetry, pose_distance
+from reach.symmetry import Symmetry
 from reach.transforms import inverse
 from registration.hypotheses import free_starts, planar_starts
 from registration.job import Job
@@ -85,8 +85,8 @@ def _near(job: Job, T_best: FloatArray, starts: FloatArray, turned: float) -> In
     apart = job.model.surface_distances(T_best, starts, POINTS)
     near = np.flatnonzero(apart < job.profile.distinct)
     near = near[np.argsort(apart[near], kind="stable")]
-    other = [int(i) for i in near if pose_distance(job.sym, T_best, starts[i])[0] > turned]
-    return np.array(_apart(job.sym, starts, other, SPACING)[:MOST], dtype=np.int64)
+    near = near[_turns(job.sym, T_best, starts[near]) > turned]
+    return near[_apart(job.sym, starts[near], SPACING)]
 
 
 def _spread(
@@ -94,14 +94,29 @@ def _spread(
 ) -> list[Hypothesis]:
     """Those that did not slide into the best hypothesis, nor into each other."""
     poses = np.stack([best.T_camera_object, *(h.T_camera_object for h in found)])
-    kept = _apart(sym, poses, range(len(poses)), turned)
-    return [found[i - 1] for i in kept if i > 0]
+    return [found[i - 1] for i in _apart(sym, poses, turned) if i > 0]
 
 
-def _apart(sym: Symmetry, T: FloatArray, order: Iterable[int], turned: float) -> list[int]:
-    """Indices, in order, of poses (N, 4, 4) that are turned against all those before."""
+def _apart(sym: Symmetry, T: FloatArray, turned: float) -> IntArray:
+    """Indices of the first MOST poses (N, 4, 4) that are turned against all those before."""
+    left = np.ones(len(T), bool)
     kept: list[int] = []
-    for i in order:
-        if all(pose_distance(sym, T[i], T[j])[0] > turned for j in kept):
-            kept.append(i)
-    return kept
+    while left.any() and len(kept) < MOST:
+        kept.append(int(np.argmax(left)))
+        left &= _turns(sym, T[kept[-1]], T) > turned
+        left[kept[-1]] = False
+    return np.array(kept, dtype=np.int64)
+
+
+def _turns(sym: Symmetry, T: FloatArray, others: FloatArray) -> FloatArray:
+    """Angles (N,) between a pose (4, 4) and others (N, 4, 4), up to symmetry [rad]."""
+    if sym.sphere:
+        return np.zeros(len(others))
+    copies = T[:3, :3] @ sym.rotations
+    if sym.axis is not None:
+        cosine = (others[:, :3, :3] @ sym.axis) @ (copies @ sym.axis).T
+    else:
+        same = others[:, :3, :3].reshape(-1, 9) @ copies.reshape(-1, 9).T
+        cosine = (same - 1.0) / 2.0
+    angles: FloatArray = np.arccos(np.clip(cosine.max(axis=1), -1.0, 1.0))
+    return angles
