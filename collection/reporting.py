@@ -12,6 +12,7 @@ from reach.errors import InvalidInputError
 
 if TYPE_CHECKING:
     from collection.coverage import Histogram
+    from logs.report.agreement import OperatorAgreement
     from logs.report.coverage import PlanCoverage
     from reach.evaluation.table import Evaluation
 
@@ -74,7 +75,13 @@ def write_report(
             progress=progress,
         )
     text = build_report(
-        dataset, result, error, basis=stated["basis"], seed=seed, covered=_covered(sources)
+        dataset,
+        result,
+        error,
+        basis=stated["basis"],
+        seed=seed,
+        covered=_covered(sources),
+        agreement=_agreement(sources),
     )
     write_text(page, text)
     return result
@@ -109,6 +116,19 @@ def _covered(sources: Sequence[Path]) -> PlanCoverage | None:
         ),
         {kind.value: count for kind, count in found.contacts.items()},
     )
+
+
+def _agreement(sources: Sequence[Path]) -> OperatorAgreement | None:
+    """Of all sessions' operators together; None where no source is a session."""
+    from labeling.agreement import joint_agreement
+    from logs.report.agreement import OperatorAgreement
+    from logs.session import SESSION_NAME, SessionFolder
+
+    sessions = [source for source in sources if (source / SESSION_NAME).exists()]
+    if not sessions:
+        return None
+    found = joint_agreement(SessionFolder.open(path).read_state() for path in sessions)
+    return OperatorAgreement(found.trials, found.agreed, found.kappa)
 
 
 def write_text(path: Path, text: str) -> None:

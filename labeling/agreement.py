@@ -53,6 +53,17 @@ def cohen_kappa(pairs: Iterable[tuple[str, str]]) -> float | None:
 
 def operator_agreement(state: SessionState) -> Agreement:
     """Agreement over all trials that a second operator judged blindly."""
+    return joint_agreement([state])
+
+
+def joint_agreement(states: Iterable[SessionState]) -> Agreement:
+    """The same over several sessions together."""
+    pairs = [pair for state in states for pair in _blind_pairs(state)]
+    agreed = sum(first == second for first, second in pairs)
+    return Agreement(len(pairs), agreed, cohen_kappa(pairs))
+
+
+def _blind_pairs(state: SessionState) -> list[tuple[str, str]]:
     pairs: list[tuple[str, str]] = []
     for trial in state.trials.values():
         take = trial.valid_take
@@ -64,5 +75,4 @@ def operator_agreement(state: SessionState) -> Agreement:
             for second in take.second_labels.values()
             if second.blind and second.source is first.source
         ]
-    agreed = sum(first == second for first, second in pairs)
-    return Agreement(len(pairs), agreed, cohen_kappa(pairs))
+    return pairs

@@ -11,6 +11,7 @@ import numpy as np
 
 from logs.dataset import Dataset, StatedPoseError
 from logs.errors import DatasetError
+from logs.export.names import safe_name
 from logs.export.reach2019 import ROTATION_TOLERANCE, ReadRecord, read_records
 from logs.labeled_trial import Label, LabeledTrial
 from reach.errors import UnknownNameError
@@ -166,7 +167,7 @@ def _load_objects(
     found = {path.stem: path for path in sorted(meshes.rglob("*"), key=_mesh_preference)}
     objects, sources = {}, {}
     for name in names:
-        path = found.get(name)
+        path = found.get(name) or found.get(safe_name(name))  # as exports name their files
         if path is None or path.suffix.lower() not in MESH_SUFFIXES:
             known = [stem for stem, p in found.items() if p.suffix.lower() in MESH_SUFFIXES]
             raise UnknownNameError(f"object (no mesh in {meshes})", name, known)

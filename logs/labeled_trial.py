@@ -100,6 +100,7 @@ class LabeledTrial:
     Args:
         trial_id: unique.
         session: identity of its session or source.
+        segment: of that session; grows with each accepted change of the station's set-up.
         number: place in the planned order.
         object_name: key of the data set's objects.
         grasp_id: of the planned grasp; its repeats share it.
@@ -147,6 +148,7 @@ class LabeledTrial:
     record: str | None = None
     record_sha256: str | None = None
     simulated: bool = False
+    segment: int = 0
     source_record: str | None = None
 
     def __post_init__(self) -> None:

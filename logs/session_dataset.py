@@ -16,6 +16,7 @@ from logs.session import SessionFolder
 from logs.state import TakeState, TrialState
 from reach.gripper import ParallelJawGripper
 from reach.objects import GraspObject
+from reach.transforms import make_transform
 
 _LEFT_OUT = {
     "unlabelled": "executed, not labeled",
@@ -43,9 +44,9 @@ def session_dataset(path: Path, *, unblinded: bool = False) -> Dataset:
     name = path.resolve().name
     counted = [trial for trial in state.order if trial.status == "labelled"]
     facts = read_facts([_record_path(path, trial) for trial in counted])
-    attempts = _attempts(state.order)
+    attempts, table = _attempts(state.order), _table_height(folder)
     trials = tuple(
-        _labeled_trial(trial, one, name, attempts[trial.planned.grasp_id], unblinded)
+        _labeled_trial(trial, one, name, attempts[trial.planned.grasp_id], table, unblinded)
         for trial, one in zip(counted, facts, strict=True)
     )
     return Dataset(
@@ -69,8 +70,11 @@ def _record_path(session: Path, trial: TrialState) -> Path:
 
 
 def _origin(folder: SessionFolder) -> str:
-    station = "simulated" if folder.descriptor.simulated else "real"
-    return f"Recorded on a {station} station, session {folder.descriptor.session_id}."
+    described = folder.descriptor
+    station = "simulated" if described.simulated else "real"
+    return (
+        f"Recorded on a {station} station, session {described.session_id}, seed {described.seed}."
+    )
 
 
 def _attempts(trials: Sequence[TrialState]) -> dict[str, int]:
@@ -108,8 +112,14 @@ def _gripper(facts: Sequence[RecordFacts]) -> ParallelJawGripper:
 
 
 def _labeled_trial(
-    trial: TrialState, facts: RecordFacts, session: str, attempt: int, unblinded: bool
+    trial: TrialState,
+    facts: RecordFacts,
+    session: str,
+    attempt: int,
+    table_height: float,
+    unblinded: bool,
 ) -> LabeledTrial:
+    """One row; a plan's poses rest on a table at zero and are lifted to the station's."""
     planned, described = trial.planned, facts.descriptor
     take = trial.valid_take
     assert take is not None
@@ -123,9 +133,9 @@ def _labeled_trial(
         attempt=attempt,
         repeat=planned.repeat,
         stable_pose=described.stable_pose,
-        T_world_object=described.T_world_object,
+        T_world_object=make_transform(None, (0, 0, table_height)) @ described.T_world_object,
         T_object_gripper=described.planned.T_object_gripper,
-        table_height=0.0,
+        table_height=table_height,
         opening=described.planned.opening,
         force=described.planned.force,
         label=_label(take, unblinded),
@@ -140,6 +150,7 @@ def _labeled_trial(
         record=take.record,
         record_sha256=facts.sha256,
         simulated=described.simulated,
+        segment=take.segment,
     )
 
 
@@ -212,16 +223,27 @@ def _left_out(trial: TrialState, session: str) -> LeftOut:
     )
 
 
+def _station_section(folder: SessionFolder, name: str) -> dict[str, float]:
+    """The numbers in a section of the station file; empty if there is no such section."""
+    station = folder.descriptor.config.get("station")
+    section = station.get(name) if isinstance(station, dict) else None
+    items = section.items() if isinstance(section, dict) else ()
+    return {key: float(value) for key, value in items if isinstance(value, int | float)}
+
+
+def _table_height(folder: SessionFolder) -> float:
+    """World z of the station's table [m]; zero where no station file says otherwise."""
+    return _station_section(folder, "workspace").get("table_height", 0.0)
+
+
 def _station_error(folder: SessionFolder) -> tuple[float, float] | None:
     """Variances of translation [m^2] and rotation [rad^2] that the station file states.
 
     Its section `pose_error` holds standard deviations named by cause: calibration, actuation.
     """
-    station = folder.descriptor.config.get("station")
-    stated = station.get("pose_error") if isinstance(station, dict) else None
-    if not isinstance(stated, dict):
+    numbers = _station_section(folder, "pose_error")
+    if not numbers:
         return None
-    numbers = {key: float(value) for key, value in stated.items() if isinstance(value, int | float)}
     translation = sum(v * v for key, v in numbers.items() if key.endswith("_translation"))
     rotation = sum(v * v for key, v in numbers.items() if key.endswith("_rotation"))
     return translation, rotation

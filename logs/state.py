@@ -225,6 +225,7 @@ class SessionState:
         take = trial.find_take(event.take)
         take.status, take.record, take.sensor = "executed", event.record, event.sensor
         take.recovered, take.executed_ns = event.recovered, entry.time_ns
+        take.segment = max(self.segment, 0)
         take.phase = Phase.AWAITING_LABEL
         trial.decisions.clear()  # what was decided about earlier takes is settled
 

@@ -33,6 +33,7 @@ class TakeState:
 
     Args:
         take: counts from 1.
+        segment: of the session in which it was executed: grows with each accepted change of set-up.
         labels: all verdicts that hold, oldest first.
         revealed_to: operators who were shown a prediction once their label was stored.
         stopped: the software stop was pressed between placing and the end of the motion.
@@ -40,6 +41,7 @@ class TakeState:
 
     take: int
     status: TakeStatus = "running"
+    segment: int = 0
     phase: Phase = Phase.PLACE_OBJECT
     info: dict[str, object] = field(default_factory=dict)
     record: str | None = None

@@ -125,7 +125,7 @@ def _command(sources: list[Path], **chosen: object) -> str:
     options = [
         f"--{name.replace('_', '-')}" + ("" if value is True else f" {value}")
         for name, value in chosen.items()
-        if value not in (None, False)
+        if value is not None and value is not False
     ]
     return " ".join(["reach evaluate", *(path.name or "." for path in sources), *options])
 

@@ -48,6 +48,12 @@ def _flat(matrix: FloatArray | None) -> list[float] | None:
 BASE_COLUMNS: tuple[Column, ...] = (
     Column("trial_id", "text", "unique id of the trial", lambda t: t.trial_id),
     Column("session", "text", "session or source the trial is from", lambda t: t.session),
+    Column(
+        "segment",
+        "integer",
+        "part of the session; grows with each accepted change of the station's set-up",
+        lambda t: t.segment,
+    ),
     Column("number", "integer", "place in the planned order", lambda t: t.number),
     Column("simulated", "truth", "true: no real robot moved", lambda t: t.simulated),
     Column("object", "text", "name of the object; its mesh is in meshes/", lambda t: t.object_name),
@@ -258,6 +264,7 @@ def trial_of_row(row: dict[str, Any], models: Iterable[str]) -> LabeledTrial:
     return LabeledTrial(
         trial_id=row["trial_id"],
         session=row["session"],
+        segment=row["segment"],
         number=row["number"],
         object_name=row["object"],
         grasp_id=row["grasp_id"],

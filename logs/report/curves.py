@@ -11,6 +11,8 @@ from reach.evaluation.cases import ObjectOutcomes
 from reach.evaluation.table import Evaluation
 
 BINS = 10
+FEWEST_IN_BIN = 10
+"""Trials a dot of the calibration plot stands for, at least; a fiftieth of all if that is less."""
 
 
 def pooled(result: Evaluation) -> ObjectOutcomes:
@@ -25,12 +27,14 @@ def pooled(result: Evaluation) -> ObjectOutcomes:
 def precision_recall_svg(result: Evaluation, name: str = "pr") -> str:
     """Precision against recall of every row, over all trials pooled."""
     everything = pooled(result)
-    with figure((4.6, 3.7)) as (canvas, axes):
+    lowest = 1.0
+    with figure((4.6, 4.3)) as (canvas, axes):
         for row in result.rows:
             if row.name == "constant":
                 continue
             precision, recall, _ = metrics.precision_recall(everything, row.scores)
             recall, precision = np.append(0.0, recall), np.append(precision[0], precision)
+            lowest = min(lowest, float(precision.min()))
             axes.step(
                 recall,
                 precision,
@@ -45,8 +49,9 @@ def precision_recall_svg(result: Evaluation, name: str = "pr") -> str:
         axes.annotate(
             "constant 1", (0.02, base), xytext=(0, 3), textcoords="offset points", fontsize=8
         )
-        axes.set(xlim=(0, 1.01), ylim=(0, 1.03), xlabel="recall", ylabel="precision")
-        axes.legend(loc="lower left", fontsize=8, ncols=2)
+        floor = np.floor(10 * lowest - 0.5) / 10  # no curve goes there: the space is for the others
+        axes.set(xlim=(0, 1.01), ylim=(max(0.0, floor), 1.01), xlabel="recall", ylabel="precision")
+        canvas.legend(loc="outside lower center", fontsize=8, ncols=3)
         return to_svg(canvas, name)
 
 
@@ -66,13 +71,15 @@ def reliability_bins(
 def reliability_svg(result: Evaluation, name: str = "calibration") -> str:
     """Success rate against score: a calibrated model lies on the diagonal."""
     everything = pooled(result)
-    with figure((4.6, 3.7)) as (canvas, axes):
+    with figure((4.6, 4.3)) as (canvas, axes):
         axes.plot([0, 1], [0, 1], color=color_of("oracle"), linewidth=0.8, linestyle=":")
         largest = everything.trials.sum()
         for row in result.rows:
             if row.name in ("constant", "oracle"):
                 continue
             score, rate, trials = reliability_bins(everything, row.scores)
+            enough = trials >= min(FEWEST_IN_BIN, largest / 50)
+            score, rate, trials = score[enough], rate[enough], trials[enough]
             color = color_of(row.name)
             graded = len(score) > 2  # a yes or no model has two points and no curve
             faint = 1.0 if graded else 0.45

@@ -11,6 +11,7 @@ from logs.report import sections
 from logs.report.coverage import PlanCoverage, coverage_svg
 from logs.report.curves import precision_recall_svg, reliability_svg
 from logs.report.drift import drift_svg, measure_drift
+from logs.report.footnotes import footnotes
 from logs.report.pressure import compare_pressure, pressure_svg
 from logs.report.reliability_map import ReliabilityPaint, probe_grasps, reliabilities
 from logs.report.rendering import data_uri, object_solid, render
@@ -18,6 +19,7 @@ from reach.evaluation.table import Evaluation
 
 if TYPE_CHECKING:
     from logs.dataset import Dataset
+    from logs.report.agreement import OperatorAgreement
     from reach.evaluation.cases import GraspCase
     from reach.pose_error import PoseError
 
@@ -33,6 +35,7 @@ def build_report(
     basis: str,
     seed: int = 0,
     covered: PlanCoverage | None = None,
+    agreement: OperatorAgreement | None = None,
 ) -> str:
     """Make the page.
 
@@ -43,6 +46,7 @@ def build_report(
         basis: where the pose error is from.
         seed: of the probe grasps.
         covered: what the plan covers, where a plan is known.
+        agreement: of two operators, where a second one judged.
 
     Returns:
         The HTML text; it holds all pictures and styles and loads nothing.
@@ -70,6 +74,9 @@ def build_report(
         station=sections.station(dataset),
         covered=covered,
         coverage_picture=coverage_svg(covered) if covered else None,
+        agreement=agreement,
+        gains=result.gains,
+        notes=footnotes([row.name for row in result.rows], simulated=dataset.simulated),
         drift=drift,
         drift_picture=drift_svg(drift) if drift else None,
         error={
@@ -82,7 +89,6 @@ def build_report(
 
 def _facts(dataset: Dataset, result: Evaluation) -> dict[str, Any]:
     trials = dataset.trials
-    names = {row.name for row in result.rows}
     return {
         "trials": len(trials),
         "simulated": sum(trial.simulated for trial in trials),
@@ -91,7 +97,6 @@ def _facts(dataset: Dataset, result: Evaluation) -> dict[str, Any]:
         "objects": len(dataset.by_object()),
         "grasps": len(result.cases),
         "sessions": len({trial.session for trial in trials}),
-        "dynamic_is_ceiling": "dynamic" in names and dataset.simulated,
     }
 
 
@@ -109,7 +114,7 @@ def _maps(
     from reach.models.area import AreaContact
     from reach.models.point import PointContact
 
-    case = _telling_case(dataset, result)
+    case = _telling_case(result)
     part, T = dataset.objects[case.object_name], case.scene.T_world_object
     down = T[:3, :3].T @ np.array([0.0, 0.0, -1.0])
     probes = probe_grasps(part, dataset.gripper, down, PROBES, np.random.default_rng(seed))
@@ -126,9 +131,18 @@ def _maps(
                 "mean": float(values.mean()),
             }
         )
-    return {"object": part.name, "pictures": pictures, "probes": len(probes.contacts)}
+    mine = next(one for one in result.outcomes.objects if one.name == part.name)
+    return {
+        "object": part.name,
+        "pictures": pictures,
+        "probes": len(probes.contacts),
+        "share": float(mine.successes.sum() / mine.trials.sum()),
+    }
 
 
-def _telling_case(dataset: Dataset, result: Evaluation) -> GraspCase:
-    """A grasp on the object whose shape says most: the one with the most faces."""
-    return max(result.cases, key=lambda case: len(dataset.objects[case.object_name].faces))
+def _telling_case(result: Evaluation) -> GraspCase:
+    """A grasp on the object whose trials say most: lifted closest to every other time."""
+    shares = {
+        one.name: float(one.successes.sum() / one.trials.sum()) for one in result.outcomes.objects
+    }
+    return min(result.cases, key=lambda case: abs(shares[case.object_name] - 0.5))

@@ -11,6 +11,7 @@ import numpy as np
 from logs.report.charts import color_of
 from logs.report.paper import PAPER_TABLE
 from logs.report.views import grasp_picture, object_picture
+from reach.arrays import FloatArray
 from reach.evaluation.references import REFERENCE_NAMES
 from reach.evaluation.table import Evaluation, ModelRow
 
@@ -86,14 +87,21 @@ def disagreements(result: Evaluation) -> dict[str, Any]:
     """Grasps that the preferred model misjudged most, with pictures."""
     model = preferred(result)
     off = model.scores - np.array([case.rate for case in result.cases])
-    order = np.argsort(-off, kind="stable")
     return {
         "model": model.name,
-        "false_positives": [_card(result, i) for i in order[:WORST] if off[i] >= AT_LEAST_OFF],
-        "false_negatives": [
-            _card(result, i) for i in order[::-1][:WORST] if off[i] <= -AT_LEAST_OFF
-        ],
+        "false_positives": [_card(result, i) for i in _worst(result, off)],
+        "false_negatives": [_card(result, i) for i in _worst(result, -off)],
     }
+
+
+def _worst(result: Evaluation, off: FloatArray) -> list[int]:
+    """The grasps that are off most, the one tried more often first, no object twice."""
+    trials = [case.trials for case in result.cases]
+    found: dict[str, int] = {}
+    for i in np.lexsort((-np.array(trials), -off)):
+        if off[i] >= AT_LEAST_OFF:
+            found.setdefault(result.cases[i].object_name, int(i))
+    return list(found.values())[:WORST]
 
 
 def preferred(result: Evaluation) -> ModelRow:

@@ -96,7 +96,12 @@ def make_scorer(name: str, **overrides: Any) -> Scorer:
     if name not in _FACTORIES:
         raise UnknownNameError("model", name, MODEL_NAMES)
     module, _, function = _FACTORIES[name].partition(":")
-    factory = getattr(importlib.import_module(module), function)
+    try:
+        factory = getattr(importlib.import_module(module), function)
+    except ImportError as error:
+        raise InvalidInputError(
+            f"model {name!r} cannot be used in this installation: {error}"
+        ) from error
     try:
         scorer: Scorer = factory(**overrides)
     except TypeError as error:

@@ -8,6 +8,7 @@ import trimesh
 
 from reach import Grasp, GraspObject, ParallelJawGripper, PoseError, Scene, transforms
 from reach.errors import InvalidInputError, UnknownNameError
+from reach.models import registry
 from reach.models.names import ANALYTIC_NAMES, MODEL_NAMES
 from reach.models.registry import make_scorer
 
@@ -68,3 +69,11 @@ def test_the_opening_of_a_grasp_is_heeded(scene):
     free, narrow = grasps()[0], Grasp(grasps()[0].T_object_gripper, opening=0.01)
     scores = make_scorer("reach").score_many(scene, [free, narrow])
     assert [score.value for score in scores] == [1.0, 0.0]
+
+
+def test_a_model_whose_module_is_missing_is_refused_by_name(monkeypatch):
+    monkeypatch.setitem(registry._FACTORIES, "settled", "reach.models.gone:make_gone")
+    with pytest.raises(
+        InvalidInputError, match="model 'settled' cannot be used .*reach.models.gone"
+    ):
+        make_scorer("settled")

@@ -98,6 +98,7 @@ def build_dataset(objects=3, grasps=4, repeats=2, seed=0, faces=12, simulated=Tr
                         record=f"trials/{number:04d}/trial.mcap",
                         record_sha256="0" * 64,
                         simulated=simulated,
+                        segment=int(number > 5),
                     )
                 )
     return Dataset(

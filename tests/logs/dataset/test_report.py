@@ -13,6 +13,7 @@ from PIL import Image
 
 from logs.labeled_trial import Execution
 from logs.report import sections
+from logs.report.agreement import OperatorAgreement
 from logs.report.curves import pooled, precision_recall_svg, reliability_bins, reliability_svg
 from logs.report.drift import drift_svg, measure_drift
 from logs.report.page import build_report
@@ -40,7 +41,8 @@ def dataset(make_dataset):
 
 @pytest.fixture(scope="module")
 def result(dataset):
-    scorers = [make_scorer("reach"), make_scorer("point-robust", samples=10)]
+    robust = make_scorer("point-robust", samples=10)
+    scorers = [make_scorer("reach"), make_scorer("point"), robust]
     return compare(dataset.cases(), scorers, pose_error=ERROR, use_cache=False)
 
 
@@ -48,7 +50,8 @@ def result(dataset):
 def page(dataset, result):
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr("logs.report.page.PROBES", 60)
-        return build_report(dataset, result, ERROR, basis="made up")
+        agreement = OperatorAgreement(trials=10, agreed=9, kappa=0.787)
+        return build_report(dataset, result, ERROR, basis="made up", agreement=agreement)
 
 
 class Collector(HTMLParser):
@@ -254,7 +257,8 @@ def test_drift_is_found_where_it_is_and_not_where_it_is_not(dataset):
     for slope in (0.0, 2e-3):
         ramp = slope * np.linspace(0, 1, len(dataset.trials))
         trials = tuple(map(registered, dataset.trials, ramp + noise))
-        change, error = measure_drift(replace(dataset, trials=trials)).trend["height"]
+        (segment,) = measure_drift(replace(dataset, trials=trials)).segments
+        change, error = segment.trend["height"]
         assert abs(change - slope) < 3 * error
         assert error < 1.5e-4
     assert "<svg" in drift_svg(measure_drift(dataset))
@@ -273,3 +277,37 @@ def test_worst_mistakes_are_the_worst(result):
     assert positives == sorted(positives, reverse=True)
     assert all(value >= 0.3 for value in positives)
     assert all(off[card["grasp"]] <= -0.3 for card in shown["false_negatives"])
+    objects = [card["object"] for card in shown["false_positives"]]
+    assert len(set(objects)) == len(objects)
+
+
+def test_a_step_between_segments_is_no_trend_within_them(dataset):
+    """The part appears 3 mm higher after a new calibration; neither segment drifts."""
+    noise = np.random.default_rng(3).normal(0, 1e-4, len(dataset.trials))
+    half = len(dataset.trials) // 2
+
+    def trial_at(i, trial):
+        T = make_transform(None, (0, 0, noise[i] + 3e-3 * (i >= half))) @ trial.T_world_object
+        done = replace(trial.execution, T_world_object=T, time_ns=1 + i)
+        redos = ("placement",) if i == half else ()
+        return replace(trial, execution=done, segment=int(i >= half), redos=redos)
+
+    trials = tuple(trial_at(i, trial) for i, trial in enumerate(dataset.trials))
+    found = measure_drift(replace(dataset, trials=trials))
+    assert [(s.start, s.stop) for s in found.segments] == [(0, half), (half, 2 * half)]
+    for segment in found.segments:
+        change, error = segment.trend["height"]
+        assert abs(change) < 4 * error < 1e-3
+    (joined,) = measure_drift(
+        replace(dataset, trials=tuple(replace(t, segment=0) for t in trials))
+    ).segments
+    assert joined.trend["height"][0] > 2e-3  # what a line over the step would have claimed
+    redone = found.segments[1].redone
+    assert redone["lifted"].redone + redone["failed"].redone == 1
+    assert found.segments[0].redone["lifted"].redone == 0
+
+
+def test_page_shows_agreement_of_operators_and_gain_over_the_point_model(page):
+    text = parsed(page).text
+    assert "agrees on 9 of 10 blind verdicts" in text and "0.79" in text
+    assert "reach against point" in text

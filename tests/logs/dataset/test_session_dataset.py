@@ -189,3 +189,34 @@ def test_dataset_refuses_a_repeated_trial(recorded):
     dataset = session_dataset(recorded.path)
     with pytest.raises(DatasetError, match="twice"):
         replace(dataset, trials=dataset.trials * 2)
+
+
+def test_a_plan_is_lifted_to_the_stations_table(session):
+    flat = session_dataset(session.path)
+    path = session.path / "session.json"
+    content = json.loads(path.read_text())
+    content["config"] = {"station": {"workspace": {"table_height": -0.012}}}
+    path.write_text(json.dumps(content))
+    low = session_dataset(session.path)
+    assert flat.trials[0].table_height == 0.0 and low.trials[0].table_height == -0.012
+    np.testing.assert_allclose(
+        low.trials[0].T_world_object[:3, 3],
+        flat.trials[0].T_world_object[:3, 3] + (0, 0, -0.012),
+        atol=1e-15,
+    )
+    assert low.cases()[0].scene.table_height == -0.012
+
+
+def test_trials_know_the_segment_they_were_run_in(tmp_path, sessions):
+    session = sessions.build_session(tmp_path / "wednesday", count=2)
+    second = session.descriptor.trials[1].trial_id
+    record = session.read_state().trials[second].takes[0].record
+    journal_after(
+        session,
+        ev.SessionOpened(segment=1, fingerprints={}, accepted=("calibration",), **OPERATOR),
+        ev.Redone(trial_id=second, take=1, cause=ev.RedoCause.PLACEMENT, **OPERATOR),
+        ev.TrialStarted(trial_id=second, take=2),
+        ev.Executed(trial_id=second, take=2, record=record, sensor=ev.SensorVerdict(lifted=True)),
+        ev.Labelled(trial_id=second, take=2, outcome=ev.Outcome.SUCCESS, **OPERATOR),
+    )
+    assert [trial.segment for trial in session_dataset(session.path).trials] == [0, 1]
