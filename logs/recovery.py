@@ -95,7 +95,8 @@ def _mend_journal(folder: SessionFolder, clock: Callable[[], int]) -> Iterator[F
 def _mended_text(mended: JournalRepair) -> str:
     lost = ", ".join(map(str, mended.lost)) or "none"
     problems = "; ".join(mended.problems) or "lines are missing"
-    return f"{problems}; events lost: {lost}; the original is {mended.original.name}"
+    doubtful = f"; trials in doubt, label again: {len(mended.touched)}" if mended.touched else ""
+    return f"{problems}; events lost: {lost}; kept in {mended.aside.name}{doubtful}"
 
 
 def _save_records(folder: SessionFolder) -> Iterator[Finding]:

@@ -11,6 +11,7 @@ from logs.annotation_files import read_annotations
 from logs.errors import JournalDamagedError, SessionLockedError
 from logs.index import list_takes
 from logs.journal import JOURNAL_NAME, read_journal
+from logs.journal_repair import BAD_NAME
 from logs.recorder import TrialRecorder
 from logs.records import ExitStatus, Severity
 from logs.recovery import RecoveryReport, recover_session
@@ -204,15 +205,54 @@ def test_a_lost_label_is_asked_for_again(session: SessionFolder) -> None:
     path.write_bytes(b"\n".join(lines))
     with pytest.raises(JournalDamagedError):
         session.read_state()
-    original = path.read_bytes()
     report = recover_session(session.path)
-    assert "events lost" in texts(report) and "it needs a label" in texts(report)
-    assert (session.path / f"{JOURNAL_NAME}.damaged1").read_bytes() == original
+    assert "events lost" in texts(report) and "label again: 1" in texts(report)
+    assert (session.path / BAD_NAME).read_bytes() == lines[place] + b"\n"
+    kept = path.read_bytes().split(b"\n")
+    assert kept[: len(lines) - 2] == lines[:place] + lines[place + 1 : -1]
     trial = session.read_state().order[0]
     assert trial.label is None and trial.status == "unlabelled" and trial.needs_label
     assert [t.status for t in session.read_state().order[1:3]] == ["labelled", "labelled"]
     assert read_annotations(take_folders(session.path)[0]).label is None
     assert recover_session(session.path).clean
+
+
+@pytest.mark.parametrize("decision", ["undo", "redo", "relabel"])
+@pytest.mark.parametrize("readable", [True, False])
+def test_a_label_does_not_come_back_because_what_withdrew_it_is_lost(
+    session: SessionFolder, decision: str, readable: bool
+) -> None:
+    trial = session.read_state().order[0]
+    who = {"operator": "ann", "source": ev.Source.OPERATOR, "trial_id": trial.trial_id}
+    event: ev.AnyEvent = {
+        "undo": lambda: ev.Undone(undoes=trial.decisions[-1].seq, **who),
+        "redo": lambda: ev.Redone(take=1, cause=ev.RedoCause.SEEING, **who),
+        "relabel": lambda: ev.Relabelled(
+            take=1, outcome=ev.Outcome.FAILURE, reason=ev.FailureReason.MISSED, **who
+        ),
+    }[decision]()
+    with session.open_journal() as journal:
+        journal.append(ev.PhaseEntered(trial_id=trial.trial_id, take=1, phase=ev.Phase.RESET))
+        journal.append(event)
+    path = session.path / JOURNAL_NAME
+    lines = path.read_bytes().split(b"\n")
+    lines[-2] = lines[-2].replace(b'"ann"', b'"bob"') if readable else b"garbage"
+    path.write_bytes(b"\n".join(lines))
+    recover_session(session.path)
+    found = session.read_state().order[0]
+    assert found.label is None and found.needs_label and found.status == "unlabelled"
+    assert session.read_state().order[1].status == "labelled"
+    assert recover_session(session.path).clean
+
+
+def test_a_lost_score_puts_no_label_in_doubt(session: SessionFolder) -> None:
+    path = session.path / JOURNAL_NAME
+    lines = path.read_bytes().split(b"\n")
+    place = next(i for i, line in enumerate(lines) if b'"kind":"score"' in line)
+    lines[place] = lines[place].replace(b'"version":"1"', b'"version":"2"')
+    path.write_bytes(b"\n".join(lines))
+    assert not recover_session(session.path).clean
+    assert [t.status for t in session.read_state().order[:3]] == ["labelled"] * 3
 
 
 @pytest.mark.parametrize("bad", [0, 4, -2])
