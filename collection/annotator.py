@@ -123,13 +123,16 @@ class Annotator:
         Args:
             progress: hears how many takes are left.
         """
+        told = 0
         while (self._waiting or self._views) and not self._controller.ending:
-            progress(len(self._waiting))
+            if len(self._waiting) not in (0, told):
+                told = len(self._waiting)
+                progress(told)
             oldest: Future[Any] = self._waiting[0].predictions if self._waiting else self._views[0]
             wait([oldest], LOOK_PERIOD)
             self.collect()
         if self._waiting:
-            self._say(f"{len(self._waiting)} takes are not scored yet; --resume scores them")
+            self._say(f"takes without scores yet: {len(self._waiting)}; --resume scores them")
 
     def _missing(self, take: TakeState) -> list[str]:
         return [name for name in self._models if name not in take.scores]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -10,10 +10,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from collection.placing import placing_picture
+from collection.placing import how_it_lies, placing_picture
 
 if TYPE_CHECKING:
     from collection.options import Sitting
+    from collection.plan_records import Plan
     from collection.setup import Setup
     from collection.station import Station
     from labeling.controller import SessionController
@@ -23,7 +24,7 @@ if TYPE_CHECKING:
     from registration.frame import DepthFrame
     from registration.result import Registration
 
-PLACING, OVERLAY = "how to place it", "overlay"
+OVERLAY = "overlay"
 
 
 @contextmanager
@@ -81,6 +82,7 @@ class WebConsole:
         self._sitting = sitting
         self._simulated = simulated
         self._shelf = PictureShelf(folder.path)
+        self._captions: dict[str, str] = {}
 
     @contextmanager
     def serve(self) -> Iterator[str]:
@@ -99,6 +101,7 @@ class WebConsole:
             simulated=self._simulated,
         )
         access = self._sitting.access()
+        self._captions = _captions(self._setup.plan, self._setup.objects)
         forget = self._controller.listen(self._offer_placing_picture)
         try:
             with ConsoleServer(console, access) as server:
@@ -128,8 +131,23 @@ class WebConsole:
             if trial is None or not trial.takes:
                 return
             take = trial.takes[-1].take
-        if PLACING in self._shelf.names(trial.trial_id, take):
+        if self._shelf.names(trial.trial_id, take):
             return
         obj = self._setup.objects[trial.planned.object_name]
         pose = self._setup.plan.pose_of(self._setup.plan.grasp(trial.planned.grasp_id))
-        self._shelf.put(trial.trial_id, take, PLACING, lambda: placing_picture(obj, pose))
+        self._shelf.put(
+            trial.trial_id,
+            take,
+            self._captions[trial.planned.grasp_id],
+            lambda: placing_picture(obj, pose),
+        )
+
+
+def _captions(plan: Plan, objects: Mapping[str, GraspObject]) -> dict[str, str]:
+    """How the part of each grasp lies, in words."""
+    poses = {
+        (part.name, pose.index): f"{how_it_lies(objects[part.name], pose)}; the grid is 10 mm"
+        for part in plan.objects
+        for pose in part.poses
+    }
+    return {g.grasp_id: poses[g.object_name, plan.pose_of(g).index] for g in plan.grasps}

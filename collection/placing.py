@@ -15,11 +15,6 @@ _ON_TABLE = 5e-4
 _TOUCH = {1: "one point", 2: "two points", 3: "three points"}
 
 
-def instruction(obj: GraspObject, pose: PlannedPose) -> str:
-    """One sentence that tells how to place a part."""
-    return f"Lay {obj.name} in pose {pose.index} (see the picture): {how_it_lies(obj, pose)}."
-
-
 def how_it_lies(obj: GraspObject, pose: PlannedPose) -> str:
     """Size over the table and the support of a part in a pose."""
     points = apply(pose.T_world_object, obj.vertices)

@@ -29,6 +29,7 @@ class SessionProgress:
         self._began = time.monotonic()
         self._done_before = 0
         self._shown = -1
+        self._scoring: int | None = None
         self._diverted: Callable[[str], None] | None = None
         self._bar = Progress(
             TextColumn("{task.fields[doing]}"),
@@ -78,13 +79,15 @@ class SessionProgress:
     def scoring(self, waiting: int) -> None:
         """Tell how many takes still wait for their scores."""
         self._bar.update(self._task, doing=f"scoring: {waiting} takes", left="-")
-        if not self._console.is_terminal and waiting % 25 == 0:
+        quiet = self._console.is_terminal or waiting == self._scoring
+        if waiting and not quiet and (self._scoring is None or waiting % 25 == 0):
             self.say(f"scoring: {waiting} takes left")
+        self._scoring = waiting
 
     def _look(self) -> None:
         with self._controller.reading() as state:
             counts, trial = state.counts(), state.current_trial
-            take = trial.valid_take if trial else None
+            decided = state.last_decision()
         total = counts.planned - counts.skipped
         rate = f"{counts.successes} of {counts.labelled}"
         left = self._time_left(counts.labelled, total)
@@ -94,11 +97,13 @@ class SessionProgress:
         self._bar.update(
             self._task, completed=counts.labelled, total=total, doing=doing, rate=rate, left=left
         )
-        if counts.labelled == self._shown or self._console.is_terminal:
+        before, self._shown = self._shown, counts.labelled
+        if counts.labelled <= before or self._console.is_terminal or decided is None:
             return
-        self._shown = counts.labelled
-        label = take.label if take else None
-        verdict = "lifted" if label and label.outcome is Outcome.SUCCESS else "not lifted"
+        labelled, entry = decided
+        name = labelled.planned.object_name
+        lifted = getattr(entry.event, "outcome", None) is Outcome.SUCCESS
+        verdict = "lifted" if lifted else "not lifted"
         self.say(f"trial {counts.labelled} of {total}  {name}: {verdict}  ({rate}, {left} left)")
 
     def _time_left(self, done: int, total: int) -> str:

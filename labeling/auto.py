@@ -34,6 +34,9 @@ class AutoOperator:
     Args:
         controller: the session's controller.
         choose_pose: which pose is the right one; looks at the simulation.
+
+    Raises:
+        Exception: on leaving, what kept the operator from answering; the session was ended.
     """
 
     def __init__(
@@ -45,6 +48,7 @@ class AutoOperator:
         self._controller = controller
         self._choose_pose = choose_pose
         self._leaving = threading.Event()
+        self._trouble: Exception | None = None
         self._thread = threading.Thread(target=self._run, name="auto operator", daemon=True)
 
     def __enter__(self) -> Self:
@@ -60,8 +64,17 @@ class AutoOperator:
         self._leaving.set()
         self._controller.announce()
         self._thread.join()
+        if exc is None and self._trouble is not None:
+            raise self._trouble
 
     def _run(self) -> None:
+        try:
+            self._operate()
+        except Exception as error:  # a session must not wait for an operator who is gone
+            self._trouble = error
+            self._controller.request_end()
+
+    def _operate(self) -> None:
         while not (self._leaving.is_set() or self._controller.closed):
             with self._controller.reading() as state:
                 command = self._next_command(state)

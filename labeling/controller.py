@@ -26,6 +26,7 @@ from labeling.commands import (
 )
 from labeling.errors import SessionEndingError
 from labeling.rules import NEEDS_REVISION, TRIAL_KINDS, RefusedError, event_of
+from labeling.stop_count import StopCount
 from labeling.take import Take
 from logs import events as ev
 from logs.errors import DiskFullError, JournalWriteError
@@ -75,6 +76,8 @@ class SessionController:
         self._journal = journal
         self._state = state
         self._stop_robot = stop
+        self._release_robot: Callable[[], None] = lambda: None
+        self._stopping = StopCount()
         self._clock = clock
         self._trials_left = trials_left
         self._disk_minimum = disk_minimum
@@ -82,7 +85,8 @@ class SessionController:
         self.disk_left = trials_left() if trials_left else None
         self.lights: dict[str, tuple[bool, str]] = {}
         self._changed = threading.Condition(threading.RLock())
-        self._listeners: list[Callable[[], None]] = []
+        self._listening = threading.Lock()
+        self._listeners: tuple[Callable[[], None], ...] = ()
         self._ending = False
         self._closed = False
         self._version = 0
@@ -94,12 +98,15 @@ class SessionController:
 
         A stop acts before anything else happens: before the lock, the checks and the log.
         """
-        trouble = self._stop_now() if command.kind is CommandKind.STOP else ""
-        with self._changed:
-            answer = self._decide(command, actor)
-        if trouble:
-            answer = answer.model_copy(update={"message": trouble})
-        return answer
+        if command.kind is not CommandKind.STOP:
+            with self._changed:
+                return self._decide(command, actor)
+        with self._stopping.pressed():
+            trouble = self._stop_now()
+            with self._changed:
+                answer = self._decide(command, actor)
+        self.announce()  # a stop that could not be stored is over, too
+        return answer.model_copy(update={"message": trouble}) if trouble else answer
 
     @contextmanager
     def reading(self) -> Iterator[SessionState]:
@@ -124,13 +131,13 @@ class SessionController:
 
     def listen(self, listener: Callable[[], None]) -> Callable[[], None]:
         """Call a function after every change, from any thread; returns how to end that."""
-        with self._changed:
-            self._listeners.append(listener)
+        # A lock of its own: whoever comes or goes never waits for the disk.
+        with self._listening:
+            self._listeners = (*self._listeners, listener)
 
         def forget() -> None:
-            with self._changed:
-                if listener in self._listeners:
-                    self._listeners.remove(listener)
+            with self._listening:
+                self._listeners = tuple(one for one in self._listeners if one is not listener)
 
         return forget
 
@@ -141,8 +148,9 @@ class SessionController:
 
     @property
     def may_move(self) -> bool:
-        """True unless the session is stopped, paused or held."""
-        return not (self._state.stopped or self._state.paused or self._state.holds)
+        """True unless the session is stopped, paused or held, or a stop is just being pressed."""
+        state = self._state
+        return not (state.stopped or state.paused or state.holds or self._stopping.under_way)
 
     @property
     def ending(self) -> bool:
@@ -155,6 +163,15 @@ class SessionController:
         return self._closed
 
     # -- the session's loop ---------------------------------------------------------------
+
+    def releases_with(self, release: Callable[[], None]) -> None:
+        """Name what lets the robot follow again; called only when a person clears the stop.
+
+        Args:
+            release: takes the robot's stop back; must not wait for anything.
+        """
+        with self._changed:
+            self._release_robot = release
 
     def next_work(self) -> TrialState | None:
         """The trial to attend to, or None when nothing is left or the session is to end.
@@ -291,7 +308,9 @@ class SessionController:
 
     def _decide(self, command: Command, actor: Actor) -> Answer:
         known = self._state.commands.get(command.id)
-        if known is not None:
+        # A stop that is sent again has stopped the robot again: it stands until it is cleared.
+        stops_again = command.kind is CommandKind.STOP and not self._state.stopped
+        if known is not None and not stops_again:
             rev = self._revision(command)
             return Answer(status=AnswerStatus.DUPLICATE, rev=rev, seq=known.seq)
         if self._closed:
@@ -306,6 +325,8 @@ class SessionController:
             blind = self._is_blind(command, value, actor)
             event = event_of(self._state, command, value, actor, blind=blind)
             entry = self.record(event)
+            if command.kind is CommandKind.CLEAR_STOP:
+                self._stopping.unless_pressed(self._release_robot)
         except ValidationError as error:
             return self._no(command, AnswerStatus.REJECTED, _first_problem(error))
         except (RefusedError, JournalWriteError) as error:

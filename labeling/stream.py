@@ -50,7 +50,7 @@ async def console_stream(console: Console, streams: Streams) -> AsyncIterator[by
         with suppress(RuntimeError):  # the loop is closed: nobody listens any more
             loop.call_soon_threadsafe(changed.set)
 
-    forget = await asyncio.to_thread(console.controller.listen, wake)
+    forget = console.controller.listen(wake)
     try:
         shown = -1
         while not streams.leaving:
@@ -67,6 +67,8 @@ async def console_stream(console: Console, streams: Streams) -> AsyncIterator[by
                 return
             with suppress(TimeoutError):
                 await asyncio.wait_for(changed.wait(), TICK_PERIOD)
+        if console.controller.ending:  # in order: no console need fear for its connection
+            yield _message("end", {"tick": console.controller.tick()})
     finally:
         streams.wakers.discard(changed)
         forget()

@@ -63,7 +63,7 @@ class TerminalLink:
         limits = httpx.Timeout(ANSWER_SECONDS, read=2 * SILENCE_SECONDS)
         async with self._client.stream("GET", "/api/stream", timeout=limits) as stream:
             stream.raise_for_status()
-            event = ""
+            event, view = "", {}
             async for line in stream.aiter_lines():
                 if line.startswith("event: "):
                     event = line.removeprefix("event: ")
@@ -71,7 +71,11 @@ class TerminalLink:
                     data = json.loads(line.removeprefix("data: "))
                     self.tick, self._heard = data["tick"], time.monotonic()
                     if event == "state":
-                        yield data
+                        view = data
+                        yield view
+                    elif event == "end" and view:
+                        view = {**view, "state": "ENDED"}
+                        yield view
 
     async def say_alive(self) -> None:
         """Give a sign of life; a lost connection shows in the stream."""

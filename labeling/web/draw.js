@@ -159,6 +159,7 @@ export function receipt(kind, message, seconds = 2.2) {
   const output = byId("receipt");
   output.dataset.kind = kind;
   output.textContent = message;
+  if (kind === "stored") byId("last-stored").textContent = `✓ ${message}`;
   clearTimeout(receiptTimer);
   receiptTimer = setTimeout(() => { output.dataset.kind = "none"; }, seconds * 1000);
   document.body.classList.remove("flash-stored", "flash-refused");

@@ -6,10 +6,12 @@ const ALIVE_MS = 1500;
 const ANSWER_MS = 3000;
 
 export class Link {
-  // onView(view) for every new view; onHealth(alive) whenever the connection is lost or back.
-  constructor(token, onView, onHealth) {
+  // onView(view) for every new view; onEnd() when the session has ended in order; onHealth(alive)
+  // whenever the connection is lost or back.
+  constructor(token, { onView, onEnd, onHealth }) {
     this.headers = { Authorization: `Bearer ${token}` };
     this.onView = onView;
+    this.onEnd = onEnd;
     this.onHealth = onHealth;
     this.tick = null;
     this.heard = -Infinity;
@@ -73,6 +75,7 @@ export class Link {
     this.problem = "";
     this.judge();
     if (fields.event === "state") this.onView(data);
+    if (fields.event === "end") this.onEnd();
   }
 
   post(path, body, signal) {

@@ -25,7 +25,7 @@ const page = {
   about: "", // the trial and take that rotated and choosing belong to
 };
 
-const link = new Link(token, onView, () => draw());
+const link = new Link(token, { onView, onEnd, onHealth: () => draw() });
 const commands = new Commands(link, () => draw(), afterStored);
 const send = (command, said) => commands.send(command, said);
 const stage = new Stage(link, onForwardedKey);
@@ -267,6 +267,16 @@ function wire() {
 
 // ---- drawing --------------------------------------------------------------------------------
 
+// A past trial whose label is given again: its recording and name, not the present trial's.
+function shownAgain(about) {
+  return { ...about, of: page.view.counts.planned, stable_pose: null, phase: "AWAITING_LABEL", pictures: [] };
+}
+
+function onEnd() {
+  if (page.view) page.view.state = "ENDED";
+  draw();
+}
+
 function onView(view) {
   const asked = page.view?.trial?.phase;
   page.view = view;
@@ -294,8 +304,9 @@ function paint() {
   if (!view) return drawBanner(state, null, null, link.problem);
   drawSession(view, link.alive);
   const about = target();
-  const trial = view.mode === "review" ? review.shown(view) : view.trial;
-  drawBanner(state, trial, view, link.problem);
+  const past = about?.kind === "relabel" && view.mode === "run";
+  const trial = view.mode === "review" ? review.shown(view) : past ? shownAgain(about) : view.trial;
+  drawBanner(state, view.trial, view, link.problem);
   const again = view.mode === "review" ? about : about?.kind === "relabel" ? about : null;
   drawRelabelBanner(["LOST", "STOPPED"].includes(state) ? null : again);
   byId("cancel-target").hidden ||= view.mode === "review";

@@ -60,7 +60,8 @@ export class Stage {
   ready(name) {
     if (name === "live") return true;
     const slot = this.loaded[name];
-    const key = `${this.trial.trial_id}/${this.trial.take}/${name === "recording" ? "" : this.trial.phase}`;
+    // A picture that came stays while others of its take arrive: only the take makes it old.
+    const key = `${this.trial.trial_id}/${this.trial.take}`;
     if (slot.key !== key) {
       Object.assign(slot, { key, came: null });
       this.fetch(name, slot, key);
@@ -83,6 +84,7 @@ export class Stage {
     const image = byId(id).querySelector("img");
     if (image.src.startsWith("blob:")) URL.revokeObjectURL(image.src);
     image.src = source ?? "data:,";
+    if (id !== OVERLAY) byId(id).querySelector("figcaption").textContent = name;
     return source;
   }
 

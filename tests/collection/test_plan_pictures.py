@@ -11,7 +11,7 @@ from PIL import Image
 from collection.coverage import Contact, coverage
 from collection.objects import load_object
 from collection.pictures import PART_COLOR, View, part_picture
-from collection.placing import how_it_lies, instruction, placing_picture
+from collection.placing import how_it_lies, placing_picture
 from collection.plan import Plan, make_plan
 from collection.plan_table import pose_table, trial_table
 from collection.sampling import SamplingOptions
@@ -73,7 +73,7 @@ def test_instructions_tell_height_footprint_and_support(plan, parts):
         "30 mm high, 30 x 30 mm seen from above, resting on an area of 30 x 30 mm"
     )
     upright = plan.objects[1].poses[1]
-    assert "52 mm high, 26 x 26 mm" in instruction(parts["cylinder"], upright)
+    assert "52 mm high, 26 x 26 mm" in how_it_lies(parts["cylinder"], upright)
 
 
 def test_a_picture_shows_the_part_as_it_lies(plan, parts):

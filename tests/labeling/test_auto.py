@@ -6,7 +6,10 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any
 
+import pytest
+
 from labeling.auto import AutoOperator
+from labeling.errors import SessionEndingError
 from logs.events import Phase, SensorVerdict
 from logs.journal import read_journal
 from logs.session import SessionFolder
@@ -61,3 +64,19 @@ def test_it_leaves_at_once(bench: Any) -> None:
     with AutoOperator(bench.controller) as operator:
         pass
     assert not operator._thread.is_alive()
+
+
+def test_an_operator_who_fails_ends_the_session_and_is_told(bench: Any) -> None:
+    def fail(trial: object, take: object) -> int:
+        raise ZeroDivisionError("no pose to compare with")
+
+    def run() -> None:
+        with AutoOperator(bench.controller, choose_pose=fail):
+            take = bench.begin()
+            take.wait_placed()
+            take.advance(Phase.REGISTER)
+            with pytest.raises(SessionEndingError):
+                take.confirm_pose({"rivals": [{}]})
+
+    with pytest.raises(ZeroDivisionError):
+        run()
