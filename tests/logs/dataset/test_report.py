@@ -250,7 +250,8 @@ def test_patch_and_pins_agree_for_a_cube_held_at_its_edge():
 def test_drift_is_found_where_it_is_and_not_where_it_is_not(dataset):
     def registered(trial, height):
         T = make_transform(None, (0, 0, height)) @ trial.T_world_object
-        return replace(trial, execution=Execution(T_world_object=T, time_ns=trial.number))
+        done = Execution(T_world_object=T, time_ns=trial.number)
+        return replace(trial, execution=done, segment=0)
 
     rng = np.random.default_rng(0)
     noise = rng.normal(0, 1e-4, len(dataset.trials))
