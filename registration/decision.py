@@ -11,7 +11,7 @@ from reach.symmetry import pose_distance
 from registration.evidence import Evidence, compare
 from registration.job import Job
 from registration.polish import PRINT_ERROR
-from registration.refine import fit_of
+from registration.refine import NEAR, fit_of
 from registration.search import Hypothesis
 from registration.unobservable import open_ends
 
@@ -75,7 +75,7 @@ def decide(job: Job, found: Sequence[Hypothesis], declared: int | None) -> Decis
         declared: index of the declared stable pose, None if there is none.
     """
     near = [h for h in found if h.cost <= found[0].cost + CLEARLY_WORSE]
-    chosen = _winner(job, near)
+    chosen = _winner(job, [h for h in near if h.cost <= found[0].cost + NEAR])
     contradicts = False
     if declared is not None and chosen.stable_pose != declared:
         own = [h for h in near if h.stable_pose == declared]

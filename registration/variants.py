@@ -20,11 +20,11 @@ from registration.job import Job
 from registration.refine import refined
 from registration.search import FREE, Hypothesis
 
-POINTS = 160
+POINTS = 80
 """Surface points by which poses are compared at first."""
 SPACING = np.radians(9.0)
 """Variants nearer to each other, up to symmetry, are one: it slides to where it fits best [rad]."""
-NEAR, REFINED = 0.01, 2
+CLOSE, REFINED = 0.01, 2
 """So many variants are refined whose render cost is this close to the best pose's."""
 MOST = 24
 """Variants that are aligned and rendered."""
@@ -42,7 +42,7 @@ def with_variants(job: Job, found: Sequence[Hypothesis], declared: int | None) -
     if declared is not None and not job.options.check_other_poses:
         poses = tuple(pose for pose in poses if pose.index in (declared, found[0].stable_pose))
     added = _variants(job, found[0], poses)
-    likely = [h for h in added if h.cost <= found[0].cost + NEAR][:REFINED]
+    likely = [h for h in added if h.cost <= found[0].cost + CLOSE][:REFINED]
     added[: len(likely)] = [refined(job, h) for h in likely]
     return sorted([*found, *added], key=lambda hypothesis: hypothesis.cost)
 

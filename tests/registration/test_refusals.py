@@ -100,8 +100,24 @@ def test_a_finger_at_the_edge_does_not_matter(parts, scenes, is_right):
     assert right >= 3
 
 
-def test_a_part_near_the_border_is_found(parts, scenes, is_right):
-    settings = scenes.SceneSettings(aim=(0.085, 0.0))
+@pytest.mark.parametrize("sensor", SENSORS)
+def test_a_part_at_the_border_is_found(parts, scenes, is_right, sensor):
+    half = {"structured-light": 0.126, "stereo": 0.223}[sensor]  # of the image's width [m]
+    settings = scenes.SceneSettings(sensor, aim=(half - 0.025, 0.0), offset=0.0)
     case = scenes.make_case(parts["chiral_stair"], np.random.default_rng(9), settings)
+    k, T = case.frame.intrinsics, case.T_camera_object
+    corners = case.obj.vertices @ T[:3, :3].T + T[:3, 3]
+    u = corners[:, 0] / corners[:, 2] * k.fx + k.cx
+    assert u.min() < 15  # it reaches the border, or beyond
     found = register(case.obj, case.frame, stable_pose=case.stable_pose)
     assert found.accepted and is_right(case, found.T_camera_object)
+
+
+@pytest.mark.parametrize("sensor", SENSORS)
+def test_a_table_that_is_not_level_does_not_matter(parts, scenes, is_right, sensor):
+    settings = scenes.SceneSettings(sensor, table_tilt=np.radians(5))
+    case = scenes.make_case(parts["bracket"], np.random.default_rng(2), settings)
+    found = register(case.obj, case.frame, stable_pose=case.stable_pose)
+    assert found.accepted and is_right(case, found.T_camera_object)
+    assert np.degrees(found.table.tilt) == pytest.approx(5, abs=0.2)
+    assert found.tilt < np.radians(0.5)  # against the table, not the world
