@@ -11,7 +11,13 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from collection.errors import CollectionError, DeviceError, PlacementError, Recovery
+from collection.errors import (
+    CollectionError,
+    DeviceError,
+    PlacementError,
+    Recovery,
+    StoppedError,
+)
 from collection.trial import TrialContext, run_take
 from labeling.auto import ACTOR
 from labeling.commands import AnswerStatus, Command, CommandKind
@@ -50,6 +56,7 @@ class Session:
     attempts: int
     attended: bool
     say: Callable[[str], None]
+    _disturbed: bool = False
 
     def run(self) -> None:
         """Run until every planned trial is labelled or skipped, or the session is to end.
@@ -58,11 +65,14 @@ class Session:
             DeviceError: the station needs a person, and nobody is there.
         """
         voids: Counter[str] = Counter()
+        self.controller.releases_with(self.context.station.arm.release_stop)
         while (work := self.controller.next_work()) is not None:
+            if work.valid_take is None and not self._station_is_ready():
+                continue
             take = self.controller.begin(work)
             try:
                 if not take.executed:
-                    self._run_take(take)
+                    run_take(self.context, take, self.folder_of(take.trial_id, take.number))
                 self._settle(work, take)
             except TakeEndedError as ended:
                 self.say(str(ended))
@@ -81,12 +91,6 @@ class Session:
             if take is not None and self.annotator.lacks(take):
                 self.annotator.annotate(trial.trial_id, take)
 
-    def _run_take(self, take: Take) -> None:
-        if not self.context.station.arm.state().ready:
-            self._recover()  # after a stop that somebody cleared, or a hold that somebody ended
-        self._show_lights()
-        run_take(self.context, take, self.folder_of(take.trial_id, take.number))
-
     def _settle(self, work: TrialState, take: Take) -> None:
         decision = take.await_label()
         take.reset()
@@ -94,15 +98,18 @@ class Session:
             self.annotator.annotate(work.trial_id, work.valid_take)
 
     def _void(self, work: TrialState, take: Take, error: Exception, times: int) -> None:
-        """Give the take up; bring the station back, or wait for a person who can."""
+        """Give the take up; the next one brings the station back, or a person has to.
+
+        Nothing moves here: the operator may have stopped the session meanwhile, and the loop
+        waits until it may move again.
+        """
         take.void(f"{type(error).__name__}: {error}")
         self._show_lights()
         self.say(f"void: {error}")
-        recovery = error.recovery if isinstance(error, DeviceError) else Recovery.VOID
-        unready = isinstance(error, DeviceError) or not self.context.station.arm.state().ready
-        if unready and recovery is not Recovery.HALT:
-            recovery = self._recover()
-        if recovery is Recovery.HALT:
+        self._disturbed = self._disturbed or isinstance(error, DeviceError)
+        if self._stopped_by_operator(error):
+            return
+        if isinstance(error, DeviceError) and error.recovery is Recovery.HALT:
             self._need_person(error)
         elif times >= self.attempts:
             self._give_up(work, f"void {times} times in a row, the last time because: {error}")
@@ -126,20 +133,46 @@ class Session:
         self.controller.set_light("robot", arm.ready, arm.error or "")
         self.controller.set_light("camera", camera.connected, camera.detail)
 
-    def _recover(self) -> Recovery:
-        """Re-initialize the devices after a fault; HALT if only a person can help."""
+    def _station_is_ready(self) -> bool:
+        """Bring the station back after a fault, a hold or a cleared stop, if it has to be.
+
+        Called only where the session may move: a stop from now on ends the recovery, too.
+
+        Returns:
+            False if it did not come back, or was stopped meanwhile: the loop waits again.
+        """
+        try:
+            if self._disturbed or not self.context.station.arm.state().ready:
+                self._recover()
+        except DeviceError as error:
+            self._disturbed = True
+            self._show_lights()
+            if self._stopped_by_operator(error):
+                return False
+            self.say(f"the station did not recover: {error}")
+            self._need_person(error)
+            return False
+        self._disturbed = False
+        self._show_lights()
+        return True
+
+    def _stopped_by_operator(self, error: Exception) -> bool:
+        """Whether the session's own stop ended a motion: the loop waits until it is cleared."""
+        return isinstance(error, StoppedError) and not self.controller.may_move
+
+    def _recover(self) -> None:
+        """Re-initialize the devices.
+
+        Raises:
+            DeviceError: the operator stopped it, or only a person can help.
+        """
         from collection.robots.motion import recover
 
         station = self.context.station
-        try:
-            station.arm.connect()
-            station.gripper.connect()
-            station.camera.connect()
-            recover(station.arm, station.gripper, station.config.motion)
-        except DeviceError as error:
-            self.say(f"the station did not recover: {error}")
-            return Recovery.HALT
-        return Recovery.RETRY
+        station.arm.connect()
+        station.gripper.connect()
+        station.camera.connect()
+        recover(station.arm, station.gripper, station.config.motion)
 
     def _need_person(self, error: Exception) -> None:
         if not self.attended:

@@ -34,6 +34,7 @@ from registration.result import Registration
 
 if TYPE_CHECKING:
     from collection.plan_records import Plan, PlannedGrasp, PlannedPose, PlannedTrial
+    from collection.robots.protocol import Arm
     from collection.station import Station
     from labeling.take import Take
     from reach.objects import GraspObject
@@ -152,6 +153,7 @@ def _attempt(context: TrialContext, take: Take) -> _Attempt:
 def _place(attempt: _Attempt) -> None:
     """Wait for the operator; where the table is simulated, the object appears on it now."""
     attempt.take.wait_placed()
+    _wake(attempt.station.arm)
     simulation = attempt.station.simulation
     if simulation is None:
         return
@@ -162,6 +164,16 @@ def _place(attempt: _Attempt) -> None:
 
     rng = np.random.default_rng(attempt.seed)
     simulation.place(attempt.obj, attempt.pose, rng, accept=accept)
+
+
+def _wake(arm: Arm) -> None:
+    """Let an arm follow again that was stopped, and released, while the part was placed.
+
+    Nothing had moved, so there is nothing to recover from. Motors that are off stay off.
+    """
+    state = arm.state()
+    if state.connected and state.motors_on and state.automatic and not state.ready:
+        arm.clear_error()
 
 
 def _start(attempt: _Attempt, recorder: TrialRecorder) -> None:

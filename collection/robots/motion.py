@@ -10,6 +10,7 @@ from collection.clock import Clock
 from collection.errors import (
     CollisionStopError,
     GripperNotCalibratedError,
+    JointLimitError,
     RobotError,
     UnreachableError,
     UnsafeMotionError,
@@ -41,6 +42,8 @@ from reach.transforms import make_transform
 
 RECOVERY_LIFT = 0.050
 """After a collision the arm first clears its path upward [m]."""
+NO_WAY_UP = (UnreachableError, JointLimitError, UnsafeMotionError)
+"""Before anything moves, the arm finds that it cannot go straight up from where it is."""
 
 
 def reachable_grasps(
@@ -147,24 +150,26 @@ def execute_grasp(
 
 
 def make_safe(arm: Arm, gripper: GripperDevice) -> None:
-    """Stop arm and hand, whatever state they are in."""
-    for stop in (arm.stop, gripper.stop):
+    """Halt arm and hand, whatever state they are in."""
+    for halt in (arm.halt, gripper.halt):
         with suppress(RobotError):  # a lost controller has stopped already, and cannot be told
-            stop()
+            halt()
 
 
 def recover(arm: Arm, gripper: GripperDevice, settings: MotionSettings | None = None) -> None:
     """After a failed motion: clear the error, clear the path upward, open, and go home.
 
     Raises:
-        RobotError: if only a person can help (emergency stop, manual mode, lost connection).
+        StoppedError: the operator's stop stands, or was pressed meanwhile; nothing moves on.
+        RobotError: if only a person can help (emergency stop, manual mode, lost connection, an
+            arm that meets something on its way up).
     """
     settings = settings or MotionSettings()
     arm.clear_error()
-    with suppress(RobotError):  # at the end of its reach it goes home from where it is
-        up = make_transform(None, (0, 0, RECOVERY_LIFT)) @ arm.pose()
+    up = make_transform(None, (0, 0, RECOVERY_LIFT)) @ arm.pose()
+    with suppress(*NO_WAY_UP):  # at the end of its reach it goes home from where it is
         arm.move_to_pose(up, path=Path.LINEAR, speed=settings.careful())
-    arm.clear_error()
+    arm.clear_error()  # a controller that refused the way stops its program
     _open_calibrated(gripper)
     arm.home(speed=settings.transit())
 

@@ -247,13 +247,32 @@ class Arm(Protocol):
         ...
 
     def stop(self) -> None:
-        """Stop any motion now; safe to call at any time, from any thread, and when disconnected."""
+        """The operator's stop: end any motion now, and refuse every command until `release_stop`.
+
+        Safe to call at any time, from any thread, and when disconnected.
+
+        Raises:
+            ConnectionLostError: it did not reach the robot; commands are refused all the same.
+        """
+        ...
+
+    def release_stop(self) -> None:
+        """Take `stop` back, on the word of a person; moves nothing, and clears no error."""
+        ...
+
+    def halt(self) -> None:
+        """End any motion now; `clear_error` makes the arm follow again.
+
+        Raises:
+            ConnectionLostError: it did not reach the robot.
+        """
         ...
 
     def clear_error(self) -> None:
-        """Acknowledge a stop or error so that commands are accepted again.
+        """Acknowledge a halt or error so that commands are accepted again.
 
         Raises:
+            StoppedError: the operator's stop stands; only `release_stop` ends it.
             RobotError: if only a person can clear it (emergency stop, manual mode).
         """
         ...
@@ -332,5 +351,9 @@ class GripperDevice(Protocol):
         ...
 
     def stop(self) -> None:
-        """Stop the jaws where they are, still holding; safe to call at any time."""
+        """The operator's stop, of the whole robot: the jaws stay where they are, still holding."""
+        ...
+
+    def halt(self) -> None:
+        """Stop the jaws where they are, still holding; the arm's `clear_error` ends it."""
         ...

@@ -13,7 +13,6 @@ from collection.errors import (
     EmergencyStopError,
     JointLimitError,
     RobotError,
-    StoppedError,
 )
 from collection.faults import FaultKind, scripted
 from collection.robots.planner import ArmPlanner, JointPath
@@ -156,14 +155,23 @@ class SimulatedArm:
         return replace(legs[-1], start_ns=legs[0].start_ns)
 
     def stop(self) -> None:
-        """Stop any motion now."""
+        """Stop any motion now, until `release_stop`."""
         self._controller.stop()
 
+    def release_stop(self) -> None:
+        """Take `stop` back, on the word of a person."""
+        self._controller.release_stop()
+
+    def halt(self) -> None:
+        """End any motion now, until `clear_error`."""
+        self._controller.halt()
+
     def clear_error(self) -> None:
-        """Acknowledge a stop or error.
+        """Acknowledge a halt or error.
 
         Raises:
             EmergencyStopError: the emergency stop is still pressed.
+            StoppedError: the operator's stop stands.
         """
         self._controller.clear()
 
@@ -215,6 +223,7 @@ class SimulatedArm:
         trajectory = self._trajectory(path, self._duration(path, speed))
         step, next_sample_ns = 0, 0
         while step < len(trajectory.joints) - 1:
+            self._controller.heed_stop()
             step = self._advance(trajectory, step)
             self._watch(path, step / (len(trajectory.joints) - 1), guarded=guarded)
             if on_sample is not None and clock.now_ns() >= next_sample_ns:
@@ -247,8 +256,6 @@ class SimulatedArm:
     def _watch(self, path: JointPath, share: float, *, guarded: bool) -> None:
         """Stop the motion where something stops it."""
         simulation = self._simulation
-        if self._controller.stopping:
-            raise self._controller.fail(StoppedError("the motion was stopped"))
         if share >= 0.5 and self._lifts(path):
             if simulation.fault_due(FaultKind.CONNECTION_LOST):
                 raise self._controller.fail(_as_robot_error(FaultKind.CONNECTION_LOST))

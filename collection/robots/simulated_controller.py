@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import threading
-
 from collection.clock import NANOSECONDS
 from collection.errors import (
     ConnectionLostError,
@@ -13,6 +11,7 @@ from collection.errors import (
     StoppedError,
 )
 from collection.robots.protocol import ArmState
+from collection.robots.stop_latch import STOPPED, StopLatch
 from collection.simulation import Simulation
 
 
@@ -28,7 +27,7 @@ class SimulatedController:
         self._users: set[str] = set()
         self._error: RobotError | None = None
         self._released_ns: int | None = None
-        self._stop = threading.Event()
+        self._latch = StopLatch()
 
     def connect(self, user: str) -> None:
         """Let a device in; a lost connection is mended."""
@@ -49,12 +48,12 @@ class SimulatedController:
 
         Raises:
             NotConnectedError: before connect().
+            StoppedError: the operator's stop stands.
             RobotError: the error that has not been cleared.
         """
         if user not in self._users:
             raise NotConnectedError(f"the simulated {user} is not connected: call connect()")
-        if self._stop.is_set() and self._error is None:
-            self._error = StoppedError("stopped; clear the error to go on")
+        self._latch.refuse()
         if self._error is not None:
             raise self._error
 
@@ -70,25 +69,41 @@ class SimulatedController:
         return error
 
     def stop(self) -> None:
-        """Stop every motion, from any thread."""
-        self._stop.set()
+        """Stop every motion until the stop is released, from any thread."""
+        self._latch.press()
 
-    @property
-    def stopping(self) -> bool:
-        """Whether somebody called stop()."""
-        return self._stop.is_set()
+    def release_stop(self) -> None:
+        """Take the stop back; like a real one, the controller then wants its error cleared."""
+        if self._latch.stands and (self._error is None or isinstance(self._error, StoppedError)):
+            self._error = StoppedError("was stopped; clear the error to go on")
+        self._latch.release()
+
+    def halt(self) -> None:
+        """End every motion; there is none, while the caller has the only thread that moves."""
+        if self._error is None:
+            self._error = StoppedError("stopped after a failure; clear the error to go on")
+
+    def heed_stop(self) -> None:
+        """End a motion under way if the operator stopped it.
+
+        Raises:
+            StoppedError: the stop stands.
+        """
+        if self._latch.stands:
+            raise self.fail(StoppedError(STOPPED))
 
     def clear(self) -> None:
-        """Forget the error.
+        """Forget the error; a stop stands until it is released.
 
         Raises:
             EmergencyStopError: the emergency stop is still pressed.
+            StoppedError: the operator's stop stands.
         """
         if self._emergency():
             raise EmergencyStopError("the emergency stop is still pressed; release it first")
         self._released_ns = None
+        self._latch.refuse()
         self._error = None
-        self._stop.clear()
 
     def state(self, user: str) -> ArmState:
         """What the controller says of itself."""
@@ -98,7 +113,7 @@ class SimulatedController:
             motors_on=not emergency,
             automatic=True,
             emergency_stop=emergency,
-            error=str(self._error) if self._error else "stopped" if self._stop.is_set() else None,
+            error=STOPPED if self._latch.stands else str(self._error) if self._error else None,
         )
 
     def _emergency(self) -> bool:

@@ -22,6 +22,8 @@ PRESSING_TIME = 2.0
 PRESSING_SHARE = 0.25
 """Of the force asked for: the jaws press, on a part or on each other."""
 WIDTH_TOLERANCE = 2e-4
+HOLDING_FORCE = 1.0
+"""Stopped jaws that press with more hold something, and go on [N]."""
 
 
 class SimulatedGripper:
@@ -127,8 +129,12 @@ class SimulatedGripper:
         return self._sample()
 
     def stop(self) -> None:
-        """Keep the jaws as they are: a held part stays held."""
+        """Keep the jaws as they are, until the arm's `release_stop`: a held part stays held."""
         self._controller.stop()
+
+    def halt(self) -> None:
+        """Keep the jaws as they are, until the arm's `clear_error`."""
+        self._controller.halt()
 
     def _begin(self) -> int:
         self._controller.require("gripper")
@@ -144,15 +150,25 @@ class SimulatedGripper:
         clock = self._simulation.clock
         limit_ns = clock.now_ns() + round(TIMEOUT * 1e9)
         while True:
+            self._heed_stop()
             clock.sleep(PERIOD)
             if on_sample is not None:
                 on_sample(self._sample())
-            if self._controller.stopping:
-                raise self._controller.fail(StoppedError("the jaws were stopped"))
+            self._heed_stop()
             if done():  # type: ignore[operator]
                 return
             if clock.now_ns() > limit_ns:
                 raise RobotTimeoutError(f"the jaws did not come to rest within {TIMEOUT} s")
+
+    def _heed_stop(self) -> None:
+        """End a motion of the jaws that the operator stopped; jaws that hold go on holding."""
+        try:
+            self._controller.heed_stop()
+        except StoppedError:
+            simulation = self._simulation
+            if not (simulation.carrying and simulation.grip_force > HOLDING_FORCE):
+                simulation.drive_jaws(0.0)
+            raise
 
     def _past(self, target: float, *, closing: bool) -> bool:
         width = self._width()

@@ -119,9 +119,20 @@ def test_closing_takes_as_long_as_the_jaws_need(station: Station) -> None:
     assert 1.2 < seconds < 1.6  # 25 mm at 20 mm/s, and a moment to rest
 
 
-def test_stop_halts_until_it_is_cleared(station: Station) -> None:
+def test_a_stop_stands_until_it_is_released(station: Station) -> None:
     station.arm.stop()
-    with pytest.raises(StoppedError):
+    for command in (station.arm.clear_error, lambda: station.arm.home(speed=FAST)):
+        with pytest.raises(StoppedError):
+            command()
+    station.arm.release_stop()
+    assert not station.arm.state().ready  # like a real one, it wants its error cleared
+    station.arm.clear_error()
+    station.arm.home(speed=FAST)
+
+
+def test_a_halt_lasts_until_the_error_is_cleared(station: Station) -> None:
+    station.gripper.halt()
+    with pytest.raises(StoppedError, match="after a failure"):
         station.arm.home(speed=FAST)
     station.arm.clear_error()
     station.arm.home(speed=FAST)
@@ -131,6 +142,7 @@ def test_stop_ends_a_motion_under_way(station: Station) -> None:
     target = station.arm.description.home + 0.3
     with pytest.raises(StoppedError):
         station.arm.move_to_joints(target, speed=FAST, on_sample=lambda _: station.arm.stop())
+    station.arm.release_stop()
     station.arm.clear_error()
     assert np.abs(station.arm.joints() - target).max() > 0.1
 

@@ -20,6 +20,7 @@ from collection.robots.protocol import (
     Speed,
     Waypoint,
 )
+from collection.robots.stop_latch import STOPPED
 from collection.robots.yumi.checks import controller_checks
 from collection.robots.yumi.diagnosis import not_ready
 from collection.robots.yumi.feedback import Feedback
@@ -103,6 +104,8 @@ class YumiRobotArm:
             return ArmState(connected=False, motors_on=False, automatic=False, error=str(error))
         reason = not_ready(state)
         stopped = None if state.running else "the controller's program is stopped"
+        if self._link.latch.stands:
+            stopped = STOPPED
         return ArmState(
             connected=True,
             motors_on=state.motors == "motoron",
@@ -196,17 +199,30 @@ class YumiRobotArm:
         return replace(legs[-1], start_ns=legs[0].start_ns)
 
     def stop(self) -> None:
-        """Stop any motion now, of both arms; `clear_error` makes the arm follow again.
+        """Stop any motion now, of both arms, until `release_stop`.
 
         Raises:
             ConnectionLostError: the stop did not reach the controller.
         """
         self._link.stop()
 
-    def clear_error(self) -> None:
-        """Acknowledge a stop or error: motors on, program from its start; moves nothing.
+    def release_stop(self) -> None:
+        """Take `stop` back, on the word of a person; the program rests until `clear_error`."""
+        self._link.release_stop()
+
+    def halt(self) -> None:
+        """Stop any motion now, of both arms; `clear_error` makes the arm follow again.
 
         Raises:
+            ConnectionLostError: it did not reach the controller.
+        """
+        self._link.halt()
+
+    def clear_error(self) -> None:
+        """Acknowledge a halt or error: motors on, program from its start; moves nothing.
+
+        Raises:
+            StoppedError: the operator's stop stands.
             RobotError: if only a person can clear it (emergency stop, manual mode).
         """
         self._link.require(HOLDER)

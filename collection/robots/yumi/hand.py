@@ -128,8 +128,12 @@ class SmartGripper:
         return self._sample(self._link.require(HOLDER).jaw_mm())
 
     def stop(self) -> None:
-        """Stop the jaws where they are, still holding; the arm stops, too."""
+        """Stop the jaws where they are, still holding, until the arm's `release_stop`."""
         self._link.stop()
+
+    def halt(self) -> None:
+        """Stop the jaws where they are, still holding; the arm halts, too."""
+        self._link.halt()
 
     @property
     def _speed_mm(self) -> float:

@@ -15,6 +15,7 @@ from collection.errors import (
     NotConnectedError,
     RobotError,
 )
+from collection.robots.stop_latch import StopLatch
 from collection.robots.yumi.config import YumiConfig
 from collection.robots.yumi.diagnosis import not_ready
 from collection.robots.yumi.program import VERSION, RapidProgram
@@ -39,10 +40,14 @@ class ControllerLink:
         self.config, self.clock = config, clock
         self.task, self.unit = config.task, config.mechanical_unit
         self.services = self._session()
-        self.program = RapidProgram(self.services, self.task, clock, config.poll_interval)
+        self.latch = StopLatch()
+        self.program = RapidProgram(
+            self.services, self.task, clock, config.poll_interval, self.latch
+        )
         self._stop_line = self._session()
         self._stop_lock = threading.Lock()
         self._holders: set[str] = set()
+        self._connecting = False
 
     def held_by(self, holder: str) -> bool:
         """Whether a device is connected."""
@@ -56,15 +61,19 @@ class ControllerLink:
         Raises:
             NotInAutoError, MotorsOffError, EmergencyStopError: a person has to act first.
             ConnectionLostError: the controller does not answer.
+            StoppedError: the operator's stop stands; the program is not started.
             RobotError: our module is not loaded, in another version, or its task is inactive.
         """
         if not self._holders or holder in self._holders:
-            self._close()
+            self._connecting = True
             try:
+                self._close()
                 self._open()
             except BaseException:
                 self._close()
                 raise
+            finally:
+                self._connecting = False
         self._holders.add(holder)
 
     def disconnect(self, holder: str) -> None:
@@ -110,27 +119,46 @@ class ControllerLink:
             passing.close()
 
     def stop(self) -> None:
-        """Stop all programs and with them all motion; nothing happens when disconnected.
+        """Stop all programs and with them all motion, and refuse every request until released.
+
+        While nobody is connected no program of ours is followed, and only the refusal counts.
 
         Raises:
             ConnectionLostError: the stop did not reach the controller, tried twice.
         """
+        self.latch.press()
+        self.halt()
+
+    def release_stop(self) -> None:
+        """Take the stop back; the program rests until `recover` or `connect` starts it."""
+        self.latch.release()
+
+    def halt(self) -> None:
+        """Stop all programs and with them all motion; nothing to do when disconnected.
+
+        Also between two sessions: a motion may still be under way that the last one began.
+
+        Raises:
+            ConnectionLostError: it did not reach the controller, tried twice.
+        """
         with self._stop_lock:
-            if not self._stop_line.connected:
+            if not (self._holders or self._connecting):
                 return
-            self.program.note_stop()
             try:
+                self._stop_line.connect()
                 self._stop_line.stop_programs()
             except ConnectionLostError:
                 self._stop_line.reconnect()
                 self._stop_line.stop_programs()
 
     def recover(self) -> None:
-        """Bring the program back after a stop: motors on, pointer to main, start; moves nothing.
+        """Bring the program back after a halt: motors on, pointer to main, start; moves nothing.
 
         Raises:
+            StoppedError: the operator's stop stands.
             RobotError: what only a person can clear (emergency stop, manual mode).
         """
+        self.latch.refuse()
         reason = not_ready(self.services.state())
         if isinstance(reason, MotorsOffError):
             self.services.motors_on()
@@ -141,13 +169,14 @@ class ControllerLink:
 
     def _open(self) -> None:
         self.services.connect()
-        self._stop_line.connect()
         state = self.services.state()
         reason = not_ready(state)
         if reason is not None:
             raise reason
         self._check_module()
-        self._stop_line.is_running()  # signs the stop line in, so that a stop is one request
+        with self._stop_lock:
+            self._stop_line.connect()
+            self._stop_line.is_running()  # signs it in, so that a stop is one request
         if state.running:
             self.program.synchronize()
             self.program.ping(PING_TIMEOUT)
@@ -155,7 +184,11 @@ class ControllerLink:
             self._restart()
 
     def _restart(self) -> None:
+        self.latch.refuse()
         self.services.restart_programs()
+        if self.latch.stands:  # pressed meanwhile: its request may have come before the start
+            self.services.stop_programs()
+        self.latch.refuse()
         self.clock.sleep(self.config.poll_interval)  # main takes note of what it will not serve
         self.program.synchronize()
         self.program.ping(PING_TIMEOUT)

@@ -15,6 +15,7 @@ from collection.errors import (
     RobotTimeoutError,
     StoppedError,
 )
+from collection.robots.stop_latch import STOPPED, StopLatch
 from collection.robots.yumi.diagnosis import newest_event, stop_reason
 from collection.robots.yumi.messages import (
     Command,
@@ -42,36 +43,37 @@ class RapidProgram:
         task: name of the RAPID task, `T_ROB_R` or `T_ROB_L`.
         clock: for waiting between two looks at the reply.
         poll_interval: time between them [s].
+        latch: the operator's stop; while it stands no request is sent.
     """
 
     def __init__(
-        self, services: WebServices, task: str, clock: Clock, poll_interval: float
+        self,
+        services: WebServices,
+        task: str,
+        clock: Clock,
+        poll_interval: float,
+        latch: StopLatch,
     ) -> None:
         self.task = task
+        self._latch = latch
         self._services, self._clock, self._poll_interval = services, clock, poll_interval
         self._lock = threading.Lock()
         self._serving = False
         self._sequence = 0
         self._last_event = 0
-        self._stop_asked = False
 
     def version(self) -> str:
         """Version of the module that is loaded."""
         return str(from_rapid(self._services.read(self.task, VERSION)))
 
     def synchronize(self) -> None:
-        """Take up the sequence numbers and the event log where they are, and forget a stop."""
+        """Take up the sequence numbers and the event log where they are."""
         self._sequence = max(self._asked(), self.reply().sequence)
         self._last_event = newest_event(self._services)
-        self._stop_asked = False
 
     def reply(self) -> Reply:
         """The program's latest reply."""
         return Reply.from_rapid(self._services.read(self.task, REPLY))
-
-    def note_stop(self) -> None:
-        """Remember that the program was stopped on purpose; from any thread."""
-        self._stop_asked = True
 
     def serve(
         self, request: Request, *, timeout: float, meanwhile: Callable[[], None] | None = None
@@ -87,6 +89,7 @@ class RapidProgram:
             meanwhile: called at every look at the reply.
 
         Raises:
+            StoppedError: the operator's stop stands, or is pressed meanwhile.
             ConnectionLostError: the line broke twice.
             RobotTimeoutError: not done in time; the programs were stopped.
             RobotError: or one of its kinds: what the program or the controller reports.
@@ -128,6 +131,7 @@ class RapidProgram:
         raise RobotError(f"{REQUEST} in {self.task} has no sequence number: load this module")
 
     def _send(self, request: Request, sequence: int) -> None:
+        self._latch.refuse()
         self._services.write(self.task, REQUEST, request.to_rapid(sequence))
 
     def _resume(
@@ -153,6 +157,9 @@ class RapidProgram:
         looks = count()
         while True:
             self._clock.sleep(self._poll_interval)
+            if self._latch.stands:
+                self._services.stop_programs()  # here too: the stop's own line may be cut
+                self._latch.refuse()
             reply = self.reply()
             if reply.done and reply.sequence == sequence:
                 return reply
@@ -164,8 +171,8 @@ class RapidProgram:
                 meanwhile()
 
     def _stopped(self) -> DeviceError:
-        if self._stop_asked:
-            return StoppedError("stopped on request")
+        if self._latch.stands:
+            return StoppedError(STOPPED)
         reason = stop_reason(self._services, self._last_event)
         self._last_event = newest_event(self._services)
         return reason

@@ -239,14 +239,17 @@ def test_stop_from_another_thread_stops_the_motion(
             thread.start()
             thread.join()
 
-    with pytest.raises(StoppedError, match="on request"):
+    with pytest.raises(StoppedError, match="by the operator"):
         over.move_to_pose(above(0.275), speed=SLOW, on_sample=stop_once)
     halted = right.motion.joints.copy()
     clock.sleep(5.0)
     assert np.array_equal(right.motion.joints, halted)
-    with pytest.raises(StoppedError):
-        over.home(speed=FAST)
-    over.clear_error()
+    for command in (over.clear_error, lambda: over.home(speed=FAST), over.connect):
+        with pytest.raises(StoppedError):
+            command()
+        assert not controller.running
+    over.release_stop()
+    over.connect()
     over.home(speed=FAST)
 
 
