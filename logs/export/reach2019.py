@@ -16,7 +16,15 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict, Field, StrictBool, StrictInt, ValidationError
+from pydantic import (
+    BaseModel,
+    ConfigDict,
+    Field,
+    FiniteFloat,
+    StrictBool,
+    StrictInt,
+    ValidationError,
+)
 
 from logs.dataset import Dataset
 from logs.errors import DatasetError
@@ -27,7 +35,10 @@ from reach.transforms import inverse, project_to_rotation
 ROTATION_TOLERANCE = 0.02
 """How far R^T R may be off the identity before a rotation is refused."""
 
-Row = tuple[float, float, float, float]
+FARTHEST = 1.0
+"""How far a hand that grasps an object may be from it [m]: farther is another unit."""
+
+Row = tuple[FiniteFloat, FiniteFloat, FiniteFloat, FiniteFloat]
 Matrix = tuple[Row, Row, Row, Row]
 
 
@@ -75,7 +86,7 @@ def read_records(path: Path) -> list[ReadRecord]:
         DatasetError: unreadable, no list, or a record that does not fit, with its number.
     """
     try:
-        content = json.loads(path.read_text(encoding="utf-8"), parse_constant=_refuse_constant)
+        content = json.loads(path.read_text(encoding="utf-8"))
     except (OSError, UnicodeDecodeError, ValueError) as error:
         raise DatasetError(f"cannot read {path}: {error}") from error
     if not isinstance(content, list) or not content:
@@ -95,10 +106,6 @@ def read_records(path: Path) -> list[ReadRecord]:
     return records
 
 
-def _refuse_constant(text: str) -> float:
-    raise ValueError(f"{text} is not a number")
-
-
 def _check(item: Any, where: str) -> ReadRecord:
     try:
         record = Record.model_validate(item)
@@ -108,20 +115,32 @@ def _check(item: Any, where: str) -> ReadRecord:
         raise DatasetError(f"{where}: {place}: {first['msg']}") from error
     T_world_object, pose_off = _rigid(record.pose, f"{where}: pose")
     T_world_gripper, grasp_off = _rigid(record.grasp, f"{where}: grasp")
+    T_object_gripper = inverse(T_world_object) @ T_world_gripper
+    distance = float(np.linalg.norm(T_object_gripper[:3, 3]))
+    if distance > FARTHEST:
+        raise DatasetError(
+            f"{where}: the hand is {distance:.3g} m from the object, expected at most {FARTHEST:g} m; "
+            "lengths are meters"
+        )
     return ReadRecord(
         record,
         T_world_object,
-        inverse(T_world_object) @ T_world_gripper,
+        T_object_gripper,
         max(pose_off, grasp_off),
-        json.dumps(item),
+        _as_text(item, where),
     )
+
+
+def _as_text(item: Any, where: str) -> str:
+    try:
+        return json.dumps(item, allow_nan=False)
+    except ValueError as error:
+        raise DatasetError(f"{where} holds a value that is not finite") from error
 
 
 def _rigid(matrix: Matrix, where: str) -> tuple[FloatArray, float]:
     """The nearest rigid transform, and how far the rotation was off orthonormal."""
     T = np.array(matrix, dtype=float)
-    if not np.all(np.isfinite(T)):
-        raise DatasetError(f"{where} holds a value that is not finite")
     if not np.array_equal(T[3], [0.0, 0.0, 0.0, 1.0]):
         raise DatasetError(f"{where} has the last row {T[3].tolist()}, expected [0, 0, 0, 1]")
     rotation = T[:3, :3]

@@ -123,6 +123,12 @@ def scaled(key, factor):
     return matrix.tolist()
 
 
+def moved(key, meters):
+    matrix = np.array(record()[key])
+    matrix[0, 3] += meters
+    return matrix.tolist()
+
+
 def mirrored():
     matrix = np.array(record()["grasp"])
     matrix[:3, 0] *= -1
@@ -144,6 +150,10 @@ def mirrored():
         ({"stable_pose": "3"}, r"record 1: stable_pose"),
         ({"obj": ""}, r"record 1: obj"),
         ({"attempt": 0, "trial": 0}, r"record 1 repeats record 0"),
+        ({"pose": moved("pose", float("nan"))}, r"record 1: pose.0.3: Input should be a finite"),
+        ({"tf": moved("pose", float("inf"))}, r"record 1: tf.0.3: Input should be a finite"),
+        ({"note": float("nan")}, r"record 1 holds a value that is not finite"),
+        ({"pose": moved("pose", 380.0)}, r"record 1: the hand is 380 m from the object"),
     ],
 )
 def test_what_does_not_fit_is_refused_with_its_number(files, changes, message):
