@@ -16,10 +16,9 @@ from collection.drivers import (
     BuildContext,
     find_driver,
 )
-from collection.errors import StationFileError
 from collection.robots.motion_settings import MotionSettings
 from collection.simulation_settings import SimulationSettings
-from collection.station_file import read_sections, validated
+from collection.station_file import Sections, read_sections, validated
 from reach.errors import UnknownNameError
 
 if TYPE_CHECKING:
@@ -31,6 +30,8 @@ if TYPE_CHECKING:
 
 PACKAGED = Path(__file__).parent
 GRIPPERS = ("yumi",)
+SIMULATED = "simulated"
+"""Name of the simulated drivers of robot and camera."""
 
 
 class _Section(BaseModel):
@@ -230,8 +231,8 @@ def parse_station(text: str, name: str) -> StationConfig:
         data[section] = validated(driver.config_model(), raw, sections, (section,))
     config = validated(StationConfig, data, sections, ())
     assert isinstance(config, StationConfig)
-    if _simulated(config) and config.simulation is None:
-        raise StationFileError(f"{name}: a simulated device needs the section [simulation]")
+    _refuse_half_simulated(config, sections)
+    _refuse_too_strong_a_grip(config, sections)
     return config
 
 
@@ -275,5 +276,30 @@ def _driver(section: BaseModel) -> str:
     return str(section.driver)  # type: ignore[attr-defined]
 
 
-def _simulated(config: StationConfig) -> bool:
-    return "simulated" in (_driver(config.robot), _driver(config.camera))
+def _refuse_half_simulated(config: StationConfig, sections: Sections) -> None:
+    """Real devices need the wall's clock, simulated ones their own: there is one for all."""
+    robot, camera = _driver(config.robot), _driver(config.camera)
+    if (robot == SIMULATED) != (camera == SIMULATED):
+        raise sections.error(
+            ("camera", "driver"),
+            f"robot {robot!r} with camera {camera!r}: a station is simulated as a whole or not at all",
+        )
+    if robot == SIMULATED and config.simulation is None:
+        raise sections.error((), "a simulated station needs the section [simulation]")
+    if robot != SIMULATED and config.simulation is not None:
+        raise sections.error(
+            ("simulation",), f"[simulation] in a station with a real robot ({robot}): remove it"
+        )
+
+
+def _refuse_too_strong_a_grip(config: StationConfig, sections: Sections) -> None:
+    try:
+        hand = config.gripper_geometry()
+    except UnknownNameError as error:
+        raise sections.error(("gripper", "geometry"), str(error)) from error
+    if config.motion.closing_force > hand.max_force:
+        raise sections.error(
+            ("motion", "closing_force"),
+            f"closing_force {config.motion.closing_force:g} N is more than the hand's"
+            f" {hand.max_force:g} N",
+        )

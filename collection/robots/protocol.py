@@ -232,7 +232,8 @@ class Arm(Protocol):
             T_world_gripper: target, shape (4, 4).
             path: along a line, or straight in joint space.
             speed: at most this fast.
-            zone: how near the target the motion may blend into the next [m]; 0 stops there.
+            zone: how near the target the motion may blend into the next [m]; 0 stops there. A
+                permission: an arm may stop at every pose, and the simulated one does.
             guarded: stop at a light touch, not only at a hard collision.
             on_sample: called with readings while moving.
 

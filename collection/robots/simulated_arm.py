@@ -2,19 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
-from typing import Self
+from dataclasses import dataclass
 
 import numpy as np
 
 from collection.errors import (
     CollisionStopError,
     EmergencyStopError,
-    JointLimitError,
     RobotError,
 )
 from collection.faults import FaultKind, scripted
+from collection.robots.planned_arm import PlannedArm
 from collection.robots.planner import ArmPlanner, JointPath
 from collection.robots.protocol import (
     ArmListener,
@@ -22,12 +20,11 @@ from collection.robots.protocol import (
     ArmState,
     Motion,
     Path,
-    RobotDescription,
     Speed,
     Waypoint,
 )
 from collection.robots.simulated_controller import SimulatedController
-from reach.arrays import BoolArray, FloatArray, frozen
+from reach.arrays import FloatArray, frozen
 from reach.transforms import inverse, rotation_angle
 
 CONTROL_PERIOD = 4e-3
@@ -46,7 +43,7 @@ class _Trajectory:
     T_world_gripper: FloatArray
 
 
-class SimulatedArm:
+class SimulatedArm(PlannedArm):
     """One simulated YuMi arm.
 
     Args:
@@ -54,22 +51,27 @@ class SimulatedArm:
         controller: shared with the hand.
     """
 
+    same_start = 1e-9
+
     def __init__(self, planner: ArmPlanner, controller: SimulatedController) -> None:
-        self._planner = planner
+        super().__init__()
+        self._own_planner = planner
         self._controller = controller
         self._simulation = controller.simulation
         self._joints: FloatArray = np.array(planner.arm.home)
-        self._prepared: list[tuple[Waypoint, JointPath]] = []
+
+    @property
+    def _planner(self) -> ArmPlanner:
+        return self._own_planner
+
+    @property
+    def _start(self) -> FloatArray:
+        return self._joints
 
     @property
     def name(self) -> str:
         """Of the arm, for logs."""
         return f"simulated YuMi, {self._planner.arm.side} arm"
-
-    @property
-    def description(self) -> RobotDescription:
-        """Limits and shape; readable while disconnected."""
-        return self._planner.description
 
     def connect(self) -> None:
         """Reach the simulated controller."""
@@ -80,13 +82,6 @@ class SimulatedArm:
     def disconnect(self) -> None:
         """Let go of the controller."""
         self._controller.disconnect("arm")
-
-    def __enter__(self) -> Self:
-        self.connect()
-        return self
-
-    def __exit__(self, *exception: object) -> None:
-        self.disconnect()
 
     def state(self) -> ArmState:
         """What the controller says of itself."""
@@ -111,7 +106,7 @@ class SimulatedArm:
             UnsafeMotionError: the way there touches something; nothing moved.
         """
         self._controller.require("arm")
-        self._check_limits(joints)
+        self._refuse_outside_limits(joints)
         path = self._planner.joint_path(self._joints, np.asarray(joints))
         return self._execute(path, speed, guarded=False, on_sample=on_sample)
 
@@ -134,25 +129,8 @@ class SimulatedArm:
             CollisionStopError: stopped by a contact.
         """
         self._controller.require("arm")
-        waypoint = Waypoint("target", T_world_gripper, path)
-        joint_path = (
-            self._take_prepared(waypoint) or self._planner.plan([waypoint], self._joints)[0]
-        )
+        joint_path = self._path_to(Waypoint("target", T_world_gripper, path), self._joints)
         return self._execute(joint_path, speed, guarded=guarded, on_sample=on_sample)
-
-    def home(self, *, speed: Speed, on_sample: ArmListener | None = None) -> Motion:
-        """Move to the home configuration, around what is in the way.
-
-        Raises:
-            UnsafeMotionError: no way there was found; nothing moved.
-        """
-        from collection.robots.detour import detour
-
-        legs = [
-            self.move_to_joints(path.joints[-1], speed=speed, on_sample=on_sample)
-            for path in detour(self._planner, self._joints, self._planner.arm.home)
-        ]
-        return replace(legs[-1], start_ns=legs[0].start_ns)
 
     def stop(self) -> None:
         """Stop any motion now, until `release_stop`."""
@@ -174,42 +152,6 @@ class SimulatedArm:
             StoppedError: the operator's stop stands.
         """
         self._controller.clear()
-
-    def reachable(self, T_world_gripper: FloatArray) -> BoolArray:
-        """Which gripper poses (N, 4, 4) the arm reaches within its limits, clear of the table."""
-        return self._planner.reachable(T_world_gripper)
-
-    def check(self, waypoints: Sequence[Waypoint]) -> None:
-        """Dry run from the present configuration; its paths are kept for the motions to come.
-
-        Raises:
-            UnreachableError: a waypoint, or a point of a line to it, is out of reach.
-            UnsafeMotionError: every way found touches the table or the robot itself.
-        """
-        paths = self._planner.plan(waypoints, self._joints)
-        self._prepared = list(zip(waypoints, paths, strict=True))
-
-    def link_transforms(self, joints: FloatArray) -> Mapping[str, FloatArray]:
-        """Forward kinematics: T_world_link (4, 4) of every link, and of `gripper`."""
-        return self._planner.link_transforms(joints)
-
-    def _take_prepared(self, waypoint: Waypoint) -> JointPath | None:
-        for planned, path in self._prepared:
-            same_way = planned.path is waypoint.path and np.array_equal(
-                planned.T_world_gripper, waypoint.T_world_gripper
-            )
-            if same_way and np.allclose(path.joints[0], self._joints, atol=1e-9):
-                return path
-        return None
-
-    def _check_limits(self, joints: FloatArray) -> None:
-        chain = self._planner.arm.chain
-        names = self.description.joint_names
-        for name, value, low, high in zip(names, joints, chain.lower, chain.upper, strict=True):
-            if not low - 1e-9 <= value <= high + 1e-9:
-                raise JointLimitError(
-                    f"{name} cannot go to {value:.4f} rad: limits {low:.4f} to {high:.4f}"
-                )
 
     def _execute(
         self, path: JointPath, speed: Speed, *, guarded: bool, on_sample: ArmListener | None

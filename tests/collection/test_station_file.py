@@ -2,18 +2,20 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import numpy as np
 import pytest
 import trimesh
 
-from collection.clock import SimulatedClock
+from collection.clock import SimulatedClock, WallClock
 from collection.errors import CameraTimeoutError, StationFileError
 from collection.station import (
     PACKAGED,
     build_station,
     example_station,
+    find_station_file,
     load_station,
     parse_station,
     read_station,
@@ -119,6 +121,36 @@ def test_a_simulated_device_needs_the_simulation_section() -> None:
     text = SIMULATED.split("# Drawn in secret")[0]
     with pytest.raises(StationFileError, match=r"\[simulation\]"):
         parse_station(text, "lab.toml")
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "named"),
+    [
+        ('driver = "simulated"', 'driver = "yumi"', r"lab\.toml:\d+: robot 'yumi' with camera"),
+        (
+            "closing_force = 20.0",
+            "closing_force = 25.0",
+            r"lab\.toml:\d+: closing_force 25 N .* 20 N",
+        ),
+        ('geometry = "yumi"', 'geometry = "schunk"', r"lab\.toml:\d+: .*schunk.*yumi"),
+    ],
+)
+def test_what_fits_no_station_is_refused_with_its_line(old: str, new: str, named: str) -> None:
+    assert old in SIMULATED
+    text = SIMULATED.replace(old, new, 1)
+    if "yumi" in new:  # the keys of the simulated robot mean nothing to a real one
+        text = re.sub(r"(driver = \"yumi\").*?(\n\[camera\])", r"\1\n\2", text, flags=re.DOTALL)
+    with pytest.raises(StationFileError, match=named):
+        parse_station(text, "lab.toml")
+
+
+def test_a_real_station_follows_the_wall_clock_and_has_no_simulation_section() -> None:
+    text = find_station_file("yumi").read_text()
+    assert isinstance(
+        build_station(parse_station(text, "lab.toml"), text, PACKAGED, 0).clock, WallClock
+    )
+    with pytest.raises(StationFileError, match=r"lab\.toml:\d+: \[simulation\].*real robot"):
+        parse_station(f"{text}\n[simulation]\nlatency = 0.02\n", "lab.toml")
 
 
 def test_hidden_draws_stay_in_their_ranges_and_belong_to_the_object() -> None:

@@ -2,21 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import replace
+from collections.abc import Callable, Iterator
 from functools import cached_property
-from typing import TYPE_CHECKING, Self
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from collection.errors import JointLimitError, RobotError
+from collection.errors import RobotError
+from collection.robots.planned_arm import PlannedArm
 from collection.robots.protocol import (
     ArmListener,
     ArmSample,
     ArmState,
     Motion,
     Path,
-    RobotDescription,
     Speed,
     Waypoint,
 )
@@ -28,21 +27,19 @@ from collection.robots.yumi.link import ControllerLink
 from collection.robots.yumi.messages import Command, Request
 from collection.robots.yumi.speeds import motion_time, request_speeds
 from collection.robots.yumi_arm import CONTROLLER_ORDER
-from reach.arrays import BoolArray, FloatArray
+from reach.arrays import FloatArray
 from reach.transforms import as_transform, inverse, quat_wxyz_from_rotation
 
 if TYPE_CHECKING:
     from collection.checkup import Check
-    from collection.robots.planner import ArmPlanner, JointPath
+    from collection.robots.planner import ArmPlanner
 
 HOLDER = "the YuMi arm"
 TIME_FACTOR, TIME_MARGIN = 3.0, 10.0
 """A motion may take this many times its estimate, and so much more [s]."""
-SAME_START = 0.05
-"""A checked motion is executed from where it was checked, up to the arm's own accuracy [rad]."""
 
 
-class YumiRobotArm:
+class YumiRobotArm(PlannedArm):
     """One arm of a YuMi on an IRC5 controller.
 
     The computer plans and checks every motion and sends where it ends; the controller's own,
@@ -55,31 +52,32 @@ class YumiRobotArm:
         T_world_base: where the robot stands in the station's world, shape (4, 4).
     """
 
+    same_start = 0.05  # the arm's own accuracy
+
     def __init__(
         self,
         link: ControllerLink,
         make_planner: Callable[[], ArmPlanner],
         T_world_base: FloatArray,
     ) -> None:
+        super().__init__()
         self._link = link
         self._make_planner = make_planner
         self._T_world_base = as_transform(T_world_base, "T_world_base")
         self._feedback = Feedback(link, self._T_world_base, lambda q: self._planner.forward(q))
-        self._checked: list[tuple[Waypoint, JointPath]] = []
 
     @cached_property
     def _planner(self) -> ArmPlanner:
         return self._make_planner()
 
     @property
+    def _start(self) -> FloatArray:
+        return self.joints()
+
+    @property
     def name(self) -> str:
         """Of the arm, for logs."""
         return f"ABB IRB 14000 {self._link.task} at {self._link.config.address}"
-
-    @property
-    def description(self) -> RobotDescription:
-        """Limits and shape; readable while disconnected."""
-        return self._planner.description
 
     def connect(self) -> None:
         """Reach the controller and check that it is ready; moves nothing."""
@@ -88,13 +86,6 @@ class YumiRobotArm:
     def disconnect(self) -> None:
         """Let go of the controller; allowed at any time, more than once."""
         self._link.disconnect(HOLDER)
-
-    def __enter__(self) -> Self:
-        self.connect()
-        return self
-
-    def __exit__(self, *exception: object) -> None:
-        self.disconnect()
 
     def state(self) -> ArmState:
         """What the controller says of itself; an absent controller is a state, too."""
@@ -172,7 +163,8 @@ class YumiRobotArm:
         """
         T_goal = as_transform(T_world_gripper, "T_world_gripper")
         start = self.joints()
-        T_start, joints = self._planner.forward(start), self._end_joints(T_goal, path, start)
+        T_start = self._planner.forward(start)
+        joints = self._path_to(Waypoint("goal", T_goal, path), start).joints[-1]
         linear = path is Path.LINEAR
         command = Command.MOVE_POSE_LINEAR if linear else Command.MOVE_POSE_JOINT
         supervision = self._link.config.guarded_percent if guarded else 100.0
@@ -183,20 +175,6 @@ class YumiRobotArm:
         self._execute(request, self._time(T_start, T_goal, start, joints, speed), on_sample)
         reached, T = self._feedback.settle_pose(T_goal, stops=zone <= 0, before=start)
         return Motion(start_ns, self._link.clock.now_ns(), reached, T)
-
-    def home(self, *, speed: Speed, on_sample: ArmListener | None = None) -> Motion:
-        """Move to the home configuration, around the robot's own body if that is in the way.
-
-        Raises:
-            UnsafeMotionError: no way there was found; nothing moved.
-        """
-        from collection.robots.detour import detour
-
-        legs = [
-            self.move_to_joints(path.joints[-1], speed=speed, on_sample=on_sample)
-            for path in detour(self._planner, self.joints(), self.description.home)
-        ]
-        return replace(legs[-1], start_ns=legs[0].start_ns)
 
     def stop(self) -> None:
         """Stop any motion now, of both arms, until `release_stop`.
@@ -228,24 +206,6 @@ class YumiRobotArm:
         self._link.require(HOLDER)
         self._link.recover()
 
-    def reachable(self, T_world_gripper: FloatArray) -> BoolArray:
-        """Which gripper poses (N, 4, 4) the arm reaches within its limits, clear of the table."""
-        return self._planner.reachable(T_world_gripper)
-
-    def check(self, waypoints: Sequence[Waypoint]) -> None:
-        """Dry run from the present configuration; the branches found are the ones executed.
-
-        Raises:
-            UnreachableError: a waypoint, or a point of a line to it, is out of reach.
-            UnsafeMotionError: the path touches the table or the robot itself.
-        """
-        paths = self._planner.plan(waypoints, self.joints())
-        self._checked = list(zip(waypoints, paths, strict=True))
-
-    def link_transforms(self, joints: FloatArray) -> Mapping[str, FloatArray]:
-        """Forward kinematics: T_world_link (4, 4) of every link, and `gripper`."""
-        return self._planner.link_transforms(joints)
-
     def _execute(self, request: Request, estimate: float, on_sample: ArmListener | None) -> None:
         program = self._link.require(HOLDER)
         timeout = TIME_FACTOR * estimate + TIME_MARGIN
@@ -255,18 +215,6 @@ class YumiRobotArm:
     def _sample(self) -> ArmSample:
         joints = self._feedback.joints()
         return ArmSample(self._link.clock.now_ns(), joints, self._planner.forward(joints))
-
-    def _end_joints(self, T_goal: FloatArray, path: Path, start: FloatArray) -> FloatArray:
-        """Configuration to end a motion in: the checked one, else planned from where the arm is."""
-        for waypoint, checked in self._checked:
-            same_goal = np.array_equal(waypoint.T_world_gripper, T_goal)
-            same_start = np.abs(checked.joints[0] - start).max() < SAME_START
-            if same_goal and waypoint.path is path and same_start:
-                break
-        else:
-            (checked,) = self._planner.plan([Waypoint("goal", T_goal, path)], start)
-        end: FloatArray = checked.joints[-1]
-        return end
 
     def _request(
         self,
@@ -303,13 +251,3 @@ class YumiRobotArm:
         speed: Speed,
     ) -> float:
         return max(motion_time(T_start, T_end, end - start, self.description.max_speed, speed))
-
-    def _refuse_outside_limits(self, joints: FloatArray) -> None:
-        about = self.description
-        outside = (joints < about.lower) | (joints > about.upper)
-        if np.any(outside):
-            worst = int(np.argmax(outside))
-            raise JointLimitError(
-                f"{about.joint_names[worst]} at {joints[worst]:.3f} rad is outside"
-                f" {about.lower[worst]:.3f} to {about.upper[worst]:.3f}"
-            )

@@ -20,6 +20,7 @@ from collection.errors import (
     UnreachableError,
     UnsafeMotionError,
 )
+from collection.robots.planner import JointPath
 from collection.robots.protocol import ArmSample, Path, Speed, Waypoint
 from collection.robots.yumi.arm import YumiRobotArm
 from collection.robots.yumi.config import YumiConfig
@@ -130,7 +131,8 @@ def test_a_pose_the_controller_cannot_reach_is_its_error(
 ) -> None:
     # The dry run believes in a pose that the controller's own kinematics does not reach.
     here = over.joints()
-    monkeypatch.setattr(over, "_end_joints", lambda *_: here)
+    believed = JointPath(np.array([here, here]), np.array([0.0, 1.0]))
+    monkeypatch.setattr(over, "_path_to", lambda *_: believed)
     with pytest.raises(UnreachableError, match="outside its reach"):
         over.move_to_pose(above(0.3, x=1.5), speed=SLOW)
     assert over.joints() == pytest.approx(here)
@@ -139,7 +141,9 @@ def test_a_pose_the_controller_cannot_reach_is_its_error(
 def test_a_joint_beyond_its_limit_is_refused(arm: YumiRobotArm) -> None:
     goal = arm.description.home.copy()
     goal[2] = -3.0
-    with pytest.raises(JointLimitError, match=r"joint_7 at -3\.000 rad is outside -2\.941"):
+    with pytest.raises(
+        JointLimitError, match=r"joint_7 cannot go to -3\.0000 rad: limits -2\.9109"
+    ):
         arm.move_to_joints(goal, speed=FAST)
 
 
