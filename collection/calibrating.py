@@ -111,7 +111,7 @@ def read_views(folder: Path, board: Board) -> tuple[list[View], Intrinsics]:
         cameras.add(frame.intrinsics)
         views.append(View(path.stem, corners, read_gripper_pose(path)))
     if not views:
-        raise CalibrationError(f"no views (.npz) in {folder}")
+        raise CalibrationError(f"no views (.npz) in {folder}: --station FILE takes some")
     if len(cameras) > 1:
         raise CalibrationError(f"the views in {folder} are of {len(cameras)} different cameras")
     return views, cameras.pop()

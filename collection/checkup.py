@@ -9,7 +9,6 @@ from enum import StrEnum
 from pathlib import Path
 from typing import TYPE_CHECKING, Protocol, runtime_checkable
 
-from collection.errors import CalibrationError
 from reach.errors import ReachError
 
 if TYPE_CHECKING:
@@ -115,9 +114,7 @@ def _calibration(station: Station) -> Iterator[Check]:
 
     found = calibration_of(station.camera)
     if found is None:
-        if station.simulation is None:
-            raise CalibrationError("the station file names no calibration: run `reach calibrate`")
-        yield Check("calibration", Status.OK, "simulated")
+        yield _uncalibrated(station)
         return
     good = found.reprojection_rms < LARGE_REPROJECTION and found.position_std < LARGE_POSITION_STD
     yield passed(
@@ -128,6 +125,19 @@ def _calibration(station: Station) -> Iterator[Check]:
         f" {1000 * found.translation_rms:.2f} mm",
         Status.WARN,
     )
+
+
+def _uncalibrated(station: Station) -> Check:
+    """What it means that the station file names no calibration."""
+    from collection.cameras.folder import FolderCamera
+
+    if station.simulation is not None:
+        return Check("calibration", Status.OK, "simulated")
+    if isinstance(station.camera, FolderCamera):
+        detail = "none named: every frame must bring its T_world_camera, or run `reach calibrate`"
+        return Check("calibration", Status.WARN, detail)
+    detail = "the station file names no calibration: run `reach calibrate`"
+    return Check("calibration", Status.FAIL, detail)
 
 
 def _port() -> Iterator[Check]:

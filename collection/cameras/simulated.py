@@ -79,7 +79,7 @@ class SimulatedDepthCamera:
     def state(self) -> CameraState:
         """What the camera says of itself."""
         size = f"{self._intrinsics.width}x{self._intrinsics.height}"
-        return CameraState(self._connected, f"{self.name}, {size} pixels")
+        return CameraState(self._connected, f"{size} pixels")
 
     def capture(self) -> DepthFrame:
         """Take an image of the cell as it is now.

@@ -11,7 +11,7 @@ import pytest
 from collection.checkup import Check, Status, examine, guarded
 from collection.cli.main import main
 from collection.errors import CameraError
-from collection.station import load_station, parse_station
+from collection.station import find_station_file, load_station, parse_station
 
 
 def checks(capsys: pytest.CaptureFixture[str]) -> dict[str, dict[str, str]]:
@@ -56,20 +56,40 @@ def test_the_example_is_a_station_that_works(
     assert main(["doctor", "--station", str(path), "--out", str(tmp_path), "--json"]) == 0
 
 
+def real_station(folder: Path, calibration: str) -> Path:
+    """A real station whose controller nobody answers for, and whose camera is a folder."""
+    text = find_station_file("yumi").read_text()
+    for old, new in (("192.168.125.1", "127.0.0.1:9"), ("calibration.json", calibration)):
+        assert f'"{old}"' in text
+        text = text.replace(f'"{old}"', f'"{new}"')
+    path = folder / "station.toml"
+    path.write_text(text)
+    return path
+
+
 def test_a_missing_folder_and_calibration_fail_and_the_rest_is_still_checked(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    assert main(["doctor", "--example"]) == 0
-    text = capsys.readouterr().out
-    begin, end = text.index("[camera]"), text.index("# Drawn in secret")
-    camera = '[camera]\ndriver = "folder"\nfolder = "frames"\ncalibration = "c.json"\n\n'
-    path = tmp_path / "station.toml"
-    path.write_text(text[:begin] + camera + text[end:])
+    path = real_station(tmp_path, "calibration.json")
     assert main(["doctor", "--station", str(path), "--out", str(tmp_path), "--json"]) == 1
     found = checks(capsys)
+    assert found["arm"]["status"] == found["gripper"]["status"] == "fail"
     assert found["camera"]["status"] == "fail" and "frames" in found["camera"]["detail"]
+    assert found["calibration"]["status"] == "fail"
     assert "reach calibrate" in found["calibration"]["detail"]
-    assert found["arm"]["status"] == found["disk"]["status"] == "ok"
+    assert found["disk"]["status"] == "ok"
+
+
+def test_frames_that_bring_their_pose_need_no_calibration_file(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = real_station(tmp_path, "")
+    (tmp_path / "frames").mkdir()
+    assert main(["doctor", "--station", str(path), "--out", str(tmp_path), "--json"]) == 1
+    found = checks(capsys)
+    assert found["calibration"]["status"] == "warn"
+    assert "T_world_camera" in found["calibration"]["detail"]
+    assert found["camera"]["status"] == "ok"
 
 
 @pytest.mark.parametrize(

@@ -172,6 +172,11 @@ def _typed_errors(url: str) -> Iterator[None]:
         raise RobotError(f"the controller refuses: {error} (code {error.code})") from error
     except RobotError:
         raise
+    except (KeyError, TypeError, ValueError) as error:  # the library took the answer for granted
+        raise RobotError(
+            f"what answers at {url} does not speak Robot Web Services 1.0 ({error!r}): is it an IRC5"
+            " with RobotWare 6?"
+        ) from error
     except Exception as error:  # the library raises plain Exception for HTTP errors
         raise RobotError(f"the controller at {url}: {error}") from error
 
@@ -200,5 +205,6 @@ def _open_client(url: str, user: str, password: str, request_timeout: float) -> 
         def __init__(self) -> None:
             super().__init__(url, user, password)
             self._session.mount("http://", TimedAdapter())
+            self._session.trust_env = False  # no proxy between a robot and its computer
 
     return TimedRWS()

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import socket
 import sys
+import threading
+from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 
 import pytest
 from yumi_emulator import Arm, Controller, WebServices
@@ -161,6 +163,41 @@ def test_nobody_there_is_a_lost_connection(clock: SimulatedClock) -> None:
     config = YumiConfig(driver="yumi", address="127.0.0.1:9", request_timeout=0.5)
     with pytest.raises(ConnectionLostError, match="127.0.0.1:9"):
         ControllerLink(config, clock).connect("test")
+
+
+def test_what_is_no_controller_is_said(clock: SimulatedClock) -> None:
+    class Plain(BaseHTTPRequestHandler):
+        def do_GET(self) -> None:
+            self.send_response(200)
+            self.send_header("Content-Length", "2")
+            self.end_headers()
+            self.wfile.write(b"hi")
+
+        def log_message(self, *arguments: object) -> None:
+            """Say nothing."""
+
+    with ThreadingHTTPServer(("127.0.0.1", 0), Plain) as server:
+        thread = threading.Thread(target=server.serve_forever, args=(0.01,))
+        thread.start()
+        config = YumiConfig(driver="yumi", address=f"127.0.0.1:{server.server_port}")
+        link = ControllerLink(config, clock)
+        with pytest.raises(RobotError, match="does not speak Robot Web Services"):
+            link.connect("test")
+        server.shutdown()
+        thread.join()
+
+
+def test_no_proxy_stands_between_robot_and_computer(
+    config: YumiConfig, clock: SimulatedClock, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    for name in ("http_proxy", "HTTP_PROXY", "all_proxy"):
+        monkeypatch.setenv(name, "http://127.0.0.1:9")
+    monkeypatch.delenv("no_proxy", raising=False)
+    monkeypatch.delenv("NO_PROXY", raising=False)
+    link = ControllerLink(config, clock)
+    link.connect("test")
+    assert link.state().running
+    link.disconnect("test")
 
 
 def test_commands_before_connecting_are_refused(config: YumiConfig, clock: SimulatedClock) -> None:
