@@ -16,7 +16,7 @@ Steps = Callable[[TerminalConsole, Any], Awaitable[None]]
 
 
 async def until(app: TerminalConsole, condition: Callable[[], bool]) -> None:
-    async with asyncio.timeout(20):
+    async with asyncio.timeout(60):
         while not condition():
             await asyncio.sleep(0.02)
 
