@@ -347,6 +347,8 @@ def _write_report(asked: Conduct, folder: SessionFolder, terminal: Console) -> P
     from collection.reporting import write_report
 
     page = folder.path / "report.html"
+    if not terminal.is_terminal:
+        terminal.print("writing the report")
     with terminal.status("writing the report"):
         write_report([folder.path], page)
     return page
