@@ -7,7 +7,6 @@ where it may stop: at the next phase, result or the stop, never within a sampled
 from __future__ import annotations
 
 import time
-from collections import Counter
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
 from types import TracebackType
@@ -19,9 +18,9 @@ from numpy.typing import NDArray
 
 from logs import encode, topics
 from logs import encode_streams as streams
-from logs.background import BackgroundWriter
 from logs.errors import RecordWriteError
 from logs.mcap_file import DurableMcap
+from logs.record_queue import RecordQueue
 from logs.records import (
     AttachmentRecord,
     EventKind,
@@ -31,7 +30,6 @@ from logs.records import (
     TrialDescriptor,
     TrialEvent,
     TrialStop,
-    gap_event,
 )
 from logs.streams import WORLD, CameraRecord, CloudRecord, ColorImage, DepthImage
 from logs.trial_folder import RECORD_NAME
@@ -40,7 +38,6 @@ from reach.arrays import FloatArray, frozen
 METADATA_NAME = "reach-trials"
 BACKLOG_LIMIT = 256 * 2**20
 """Samples and images beyond this backlog are dropped, and reported as a gap [bytes]."""
-_SMALL = 1024
 
 
 class TrialRecorder:
@@ -66,15 +63,14 @@ class TrialRecorder:
     ) -> None:
         self.folder = folder
         self._now = now
-        self._dropped: Counter[str] = Counter()
-        self._sequences: dict[str, int] = {}
         self._stopped = False
         try:
             folder.mkdir(parents=True, exist_ok=True)
         except OSError as error:
             raise RecordWriteError(f"cannot create {folder}: {error}") from error
         self._file = DurableMcap(folder / RECORD_NAME)
-        self._writer = BackgroundWriter(self._file, backlog_limit)
+        self._queue = RecordQueue(self._file, now, backlog_limit)
+        self._writer = self._queue.writer
 
     # ---- what happened -----------------------------------------------------------------------
 
@@ -86,8 +82,8 @@ class TrialRecorder:
             lambda file: file.metadata(METADATA_NAME, encode.encode_metadata(descriptor))
         )
         stamp = descriptor.time_ns
-        self._result(topics.START, encode.encode_start(descriptor), stamp)
-        self._result(topics.DESCRIPTOR, encode.encode_descriptor(descriptor), stamp)
+        self._queue.result(topics.START, encode.encode_start(descriptor), stamp)
+        self._queue.result(topics.DESCRIPTOR, encode.encode_descriptor(descriptor), stamp)
         for attachment in attachments:
             self.attach(attachment, stamp)
         self._writer.add(DurableMcap.flush)
@@ -100,28 +96,32 @@ class TrialRecorder:
     def event(self, event: TrialEvent) -> None:
         """Record an event of robot, camera or operator."""
         self._writer.refuse_failed()
-        self._event(event)
+        self._queue.event(event)
 
     def attach(self, attachment: AttachmentRecord, time_ns: int | None = None) -> None:
         """Add a file to the record."""
         stamp = self._stamp(time_ns)
         self._writer.add(lambda file: file.attach(attachment, stamp), len(attachment.data))
-        self._result(topics.ATTACHMENT, encode.encode_attachment_note(attachment, stamp), stamp)
+        self._queue.result(
+            topics.ATTACHMENT, encode.encode_attachment_note(attachment, stamp), stamp
+        )
 
     def registration(self, result: RegistrationRecord) -> None:
         """Record where the object was found."""
         stamp = result.time_ns
-        self._result(topics.REGISTRATION, encode.encode_registration(result), stamp)
-        self._result(topics.OBJECT_POSE, streams.encode_pose(result.T_world_object, stamp), stamp)
+        self._queue.result(topics.REGISTRATION, encode.encode_registration(result), stamp)
+        self._queue.result(
+            topics.OBJECT_POSE, streams.encode_pose(result.T_world_object, stamp), stamp
+        )
 
     def execution(self, execution: ExecutionRecord) -> None:
         """Record what the robot really did."""
         stamp = execution.time_ns
-        self._result(topics.EXECUTION, encode.encode_execution(execution), stamp)
+        self._queue.result(topics.EXECUTION, encode.encode_execution(execution), stamp)
         planned = streams.encode_pose(execution.T_world_gripper_commanded, stamp)
-        self._result(topics.PLANNED_POSE, planned, stamp)
+        self._queue.result(topics.PLANNED_POSE, planned, stamp)
         executed = streams.encode_pose(execution.T_world_gripper, stamp)
-        self._result(topics.EXECUTED_POSE, executed, stamp)
+        self._queue.result(topics.EXECUTED_POSE, executed, stamp)
 
     # ---- what is measured --------------------------------------------------------------------
 
@@ -132,15 +132,17 @@ class TrialRecorder:
         text = f"{camera.name}: {camera.sensor or 'unknown sensor'}"
         self.event(TrialEvent(stamp, EventKind.CAMERA, "calibration", text, data=data))
         topic = topics.camera_topic(camera.name, "calibration")
-        self._result(topic, streams.encode_calibration(camera, stamp), stamp)
+        self._queue.result(topic, streams.encode_calibration(camera, stamp), stamp)
         pose = {streams.camera_frame(camera.name): camera.T_world_camera}
-        self._result(topics.FRAMES, streams.encode_frames(WORLD, pose, stamp), stamp)
+        self._queue.result(topics.FRAMES, streams.encode_frames(WORLD, pose, stamp), stamp)
 
     def depth(self, image: DepthImage, sequence: int | None = None) -> None:
         """Record a depth image."""
         topic = topics.camera_topic(image.camera, "depth")
         size = image.depth.nbytes
-        self._sample(topic, lambda: streams.encode_depth(image), image.time_ns, sequence, size)
+        self._queue.sample(
+            topic, lambda: streams.encode_depth(image), image.time_ns, sequence, size
+        )
 
     def color(
         self,
@@ -163,13 +165,15 @@ class TrialRecorder:
             return streams.encode_color(ColorImage.compress(time_ns, kept, camera))
 
         topic = topics.camera_topic(camera, "color")
-        self._sample(topic, message, time_ns, sequence, kept.nbytes)
+        self._queue.sample(topic, message, time_ns, sequence, kept.nbytes)
 
     def cloud(self, cloud: CloudRecord, sequence: int | None = None) -> None:
         """Record a cloud; only of a camera that gives no depth image."""
         topic = topics.camera_topic(cloud.camera, "points")
         size = cloud.points_camera.nbytes
-        self._sample(topic, lambda: streams.encode_cloud(cloud), cloud.time_ns, sequence, size)
+        self._queue.sample(
+            topic, lambda: streams.encode_cloud(cloud), cloud.time_ns, sequence, size
+        )
 
     def frames(self, time_ns: int, poses: Mapping[str, FloatArray], parent: str = WORLD) -> None:
         """Record poses T_parent_child of frames (robot links, gripper) at one instant.
@@ -184,7 +188,7 @@ class TrialRecorder:
         def message() -> Message:
             return streams.encode_frames(parent, kept, time_ns)
 
-        self._sample(topics.FRAMES, message, time_ns, None, _SMALL * (1 + len(kept) // 4))
+        self._queue.sample(topics.FRAMES, message, time_ns, None, 256 * (4 + len(kept)))
 
     def joints(
         self,
@@ -202,7 +206,7 @@ class TrialRecorder:
         def message() -> Message:
             return streams.encode_joints(kept, *values, time_ns)
 
-        self._sample(topics.JOINTS, message, time_ns, sequence)
+        self._queue.sample(topics.JOINTS, message, time_ns, sequence)
 
     def jaw(
         self, time_ns: int, width: float, force: float | None = None, sequence: int | None = None
@@ -212,7 +216,7 @@ class TrialRecorder:
         def message() -> Message:
             return streams.encode_jaw(width, force, time_ns)
 
-        self._sample(topics.JAW, message, time_ns, sequence)
+        self._queue.sample(topics.JAW, message, time_ns, sequence)
 
     # ---- the end -----------------------------------------------------------------------------
 
@@ -239,8 +243,7 @@ class TrialRecorder:
             RecordWriteError: if the disk failed; the unfinished record stays as `.part`.
         """
         stamp, received = self._stamp(time_ns), self._now()
-        for topic, count in sorted(self._dropped.items()):
-            self._event(gap_event(topic, count, "the disk did not keep up", stamp))
+        self._queue.tell_dropped(stamp)
 
         def finish(file: DurableMcap) -> None:
             stop = TrialStop(stamp, exit_status, reason, dict(file.counts))
@@ -277,41 +280,6 @@ class TrialRecorder:
 
     def _stamp(self, time_ns: int | None) -> int:
         return self._now() if time_ns is None else time_ns
-
-    def _result(self, topic: str, message: Message, time_ns: int) -> None:
-        """Queue a message that is never dropped, and refuse if the disk failed."""
-        self._writer.refuse_failed()
-        self._writer.add_message(topic, lambda: message, time_ns, self._now(), _SMALL)
-
-    def _event(self, event: TrialEvent) -> None:
-        typed, line = encode.encode_event(event), encode.encode_event_log(event)
-        received = self._now()
-        self._writer.add_message(topics.EVENT, lambda: typed, event.time_ns, received, _SMALL)
-        self._writer.add_message(topics.LOG, lambda: line, event.time_ns, received, _SMALL)
-
-    def _sample(
-        self,
-        topic: str,
-        message: Callable[[], Message],
-        time_ns: int,
-        sequence: int | None,
-        size: int = _SMALL,
-    ) -> None:
-        """Queue a measurement; drop and count it if too much waits for the disk."""
-        if sequence is not None:
-            self._watch(topic, sequence, time_ns)
-        if not self._writer.fits(size):
-            self._dropped[topic] += 1
-            return
-        self._writer.add_message(topic, message, time_ns, self._now(), size)
-
-    def _watch(self, topic: str, sequence: int, time_ns: int) -> None:
-        """Record a gap if a device's own counter jumped."""
-        last = self._sequences.get(topic)
-        self._sequences[topic] = sequence
-        if last is not None and sequence != last + 1:
-            why = f"the device's counter went from {last} to {sequence}"
-            self._event(gap_event(topic, max(sequence - last - 1, 0), why, time_ns))
 
 
 def _floats(values: Sequence[float]) -> tuple[float, ...]:

@@ -180,5 +180,8 @@ def test_the_session_s_view_draws_at_every_step(viewer, sessions, tmp_path: Path
 def test_the_record_itself_opens_in_the_viewer(viewer, take: Path) -> None:
     """Without any of this project's code: Rerun draws the .mcap that it is given."""
     views = open_file(viewer, take / "trial.mcap")
-    assert healthy(views)
+    # While the file's channels come in one by one, a camera may stand there without its pose.
+    wait_for(
+        lambda: not any(view.reports for view in viewer.get_state().views), "nothing to report"
+    )
     assert {"3D", "2D"} <= {view.view_class for view in views}
