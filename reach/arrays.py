@@ -50,9 +50,12 @@ def positive(value: float, name: str, *, zero_allowed: bool = False) -> float:
     """Return a finite positive number as float.
 
     Raises:
-        InvalidInputError: if it is negative, not finite, or zero where zero is not allowed.
+        InvalidInputError: if it is no number, negative, not finite, or zero where zero is not allowed.
     """
-    number = float(value)
+    try:
+        number = float(value)
+    except (TypeError, ValueError):
+        number = np.nan
     if not np.isfinite(number) or number < 0 or (number == 0 and not zero_allowed):
         bound = ">= 0" if zero_allowed else "> 0"
         raise InvalidInputError(f"{name} is {value!r}, expected a finite number {bound}")

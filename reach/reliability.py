@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import operator
 from collections import Counter
 from dataclasses import dataclass
 
@@ -87,10 +88,9 @@ def reliability(
         adaptive: stop as soon as the interval is narrower than this; None draws all samples.
 
     Raises:
-        InvalidInputError: no samples, a negative spread, or a width that is not positive.
+        InvalidInputError: no samples, a negative seed or spread, or a width that is not positive.
     """
-    if samples < 1:
-        raise InvalidInputError(f"samples is {samples!r}, expected at least 1")
+    check_counts(samples, seed)
     positive(friction_spread, "friction_spread", zero_allowed=True)
     positive(mass_spread, "mass_spread", zero_allowed=True)
     width = 0.0 if adaptive is None else positive(adaptive, "adaptive (interval width)")
@@ -104,7 +104,12 @@ def reliability(
     while True:
         part = slice(count, min(count + drawn_at_once, samples))
         batch = model.evaluate_batch(
-            scene, T[part], force=grasp.force, friction=friction[part], mass=mass[part]
+            scene,
+            T[part],
+            force=grasp.force,
+            friction=friction[part],
+            mass=mass[part],
+            opening=grasp.opening,
         )
         held, count = held + int(batch.resists.sum()), part.stop
         margin += float(batch.margin.sum())
@@ -112,6 +117,23 @@ def reliability(
         low, high = wilson_interval(held, count)
         if count == samples or high - low < width:
             return Reliability(held / count, low, high, count, dict(counts), margin / count)
+
+
+def check_counts(samples: int, seed: int) -> None:
+    """Refuse a number of samples or a seed that is none.
+
+    Raises:
+        InvalidInputError: naming the one that is not a whole number, or too small.
+    """
+    for name, value, least in (("samples", samples, 1), ("seed", seed, 0)):
+        try:
+            fits = operator.index(value) >= least
+        except TypeError:
+            fits = False
+        if not fits:
+            raise InvalidInputError(
+                f"{name} is {value!r}, expected a whole number, at least {least}"
+            )
 
 
 def draw_samples(

@@ -11,7 +11,6 @@ from reach.kernels.pads import Pads
 from reach.kernels.prism import NEVER, node_in_prism, normal_in_pad, triangle_in_pad
 from reach.kernels.tree import STACK, MeshTree
 from reach.kernels.verdict import (
-    NO_CONTACT,
     Workspace,
     compose,
     find_patch,
@@ -153,11 +152,8 @@ def judge_point_contacts(
             _write_point(elements, 2 * contacts + 1, c, normal, False, torsion, force[n], length)
             contacts += 1
         missing[n] = lost
-        if contacts < min(2, jaws):
-            margins[n], reasons[n] = 0.0, NO_CONTACT
-            continue
         margins[n], reasons[n] = hold(
-            normals[:contacts], elements, starts[: contacts + 1], gravity, length, cap
+            min(2, jaws), normals[:contacts], elements, starts[: contacts + 1], gravity, cap
         )
 
 
@@ -270,9 +266,6 @@ def judge_ellipse_contacts(
             _write_point(elements, contacts, c, normal, True, HERTZ_TORSION * radius, limit, length)
             contacts += 1
         missing[n] = lost
-        if contacts < min(2, jaws):
-            margins[n], reasons[n] = 0.0, NO_CONTACT
-            continue
         margins[n], reasons[n] = hold(
-            normals[:contacts], elements, starts[: contacts + 1], gravity, length, cap
+            min(2, jaws), normals[:contacts], elements, starts[: contacts + 1], gravity, cap
         )

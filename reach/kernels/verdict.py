@@ -163,14 +163,28 @@ def contact_elements(
 
 @compiled
 def hold(
+    needed: int,
     normals: FloatArray,
     points: FloatArray,
     starts: IntArray,
     gravity: FloatArray,
-    length: float,
     cap: float,
 ) -> tuple[float, int]:
-    """Margin of a set of contacts against a gravity force (3,) at the frame's origin, and reason."""
+    """Whether a set of contacts holds a gravity force at the frame's origin.
+
+    Args:
+        needed: how many contacts it takes.
+        normals: wrench of each contact's pressure, shape (J, 6), torques scaled.
+        points: friction points of all contacts, shape (POINT, P).
+        starts: first point of each contact, and the end, shape (J + 1,).
+        gravity: the weight, shape (3,) [N].
+        cap: of the margin.
+
+    Returns:
+        The margin, and the reason's code.
+    """
+    if len(normals) < needed:
+        return 0.0, NO_CONTACT
     ray = np.zeros(6)
     for i in range(3):
         ray[i] = -gravity[i]
@@ -250,9 +264,6 @@ def judge_area_contacts(
             else:
                 lost |= 1 << jaw
         missing[n] = lost
-        if contacts < min(2, jaws):
-            margins[n], reasons[n] = 0.0, NO_CONTACT
-            continue
         margins[n], reasons[n] = hold(
-            normals[:contacts], space.points, starts[: contacts + 1], gravity, length, cap
+            min(2, jaws), normals[:contacts], space.points, starts[: contacts + 1], gravity, cap
         )

@@ -10,7 +10,6 @@ from typing import Any
 import numpy as np
 
 from reach.contact import REASONS, VerdictBatch
-from reach.errors import InvalidInputError
 from reach.grasp import Grasp
 from reach.models.area import AreaContact
 from reach.models.base import ContactModel
@@ -19,7 +18,7 @@ from reach.models.ellipse import EllipseContact
 from reach.models.point import PointContact
 from reach.models.registry import Score, Scorer
 from reach.pose_error import PoseError
-from reach.reliability import FRICTION_SPREAD, MASS_SPREAD, reliability
+from reach.reliability import FRICTION_SPREAD, MASS_SPREAD, check_counts, reliability
 from reach.scene import Scene
 
 
@@ -207,8 +206,7 @@ def robust(
     sampling = {key: overrides.pop(key) for key in _ROBUST if key in overrides}
     error = PoseError.isotropic(translation=pose_translation, rotation=pose_rotation)
     scorer = RobustScorer(model(**overrides), error, **sampling)
-    if scorer.samples < 1:
-        raise InvalidInputError(f"samples is {scorer.samples!r}, expected at least 1")
+    check_counts(scorer.samples, 0)
     return scorer
 
 

@@ -63,6 +63,7 @@ class ContactModel(Protocol):
         friction: ArrayLike | None = None,
         mass: ArrayLike | None = None,
         com: ArrayLike | None = None,
+        opening: float | None = None,
         progress: Callable[[int], None] | None = None,
     ) -> VerdictBatch:
         """Judge many grasps on the same part."""
@@ -110,16 +111,18 @@ def check_batch(
     T = as_transforms(T_object_gripper)
     count = len(T)
     masses = _per_grasp(scene.object.mass if mass is None else mass, "mass [kg]", count)
-    center = np.broadcast_to(
-        np.asarray(scene.object.com if com is None else com, dtype=float), (count, 3)
-    )
+    center = _numbers(scene.object.com if com is None else com, "center of mass [m]")
+    if center.shape not in ((3,), (1, 3), (count, 3)):
+        raise InvalidInputError(
+            f"center of mass has shape {center.shape}, expected (3,) or ({count}, 3)"
+        )
     if not np.all(np.isfinite(center)):
         raise InvalidInputError(f"center of mass is not finite: {com!r}")
     down_object = scene.T_world_object[:3, :3].T @ GRAVITY
     return BatchInput(
-        T,
+        _writable(T),
         masses[:, None] * down_object,
-        np.ascontiguousarray(center),
+        _writable(np.broadcast_to(center, (count, 3))),
         _per_grasp(force, "closing force [N]", count),
         _per_grasp(friction, "friction", count, zero_allowed=True),
     )
@@ -128,12 +131,24 @@ def check_batch(
 def _checked_already(scene: Scene, grasp: Grasp, friction: float) -> BatchInput:
     """Return the batch of one grasp: its values were checked when they were made."""
     return BatchInput(
-        grasp.T_object_gripper[None],
+        _writable(grasp.T_object_gripper[None]),
         (scene.object.mass * (scene.T_world_object[:3, :3].T @ GRAVITY))[None],
-        scene.object.com[None],
+        _writable(scene.object.com[None]),
         np.array([grasp.force]),
         np.array([friction]),
     )
+
+
+def _numbers(value: ArrayLike, name: str) -> FloatArray:
+    try:
+        return np.asarray(value, dtype=float)
+    except (TypeError, ValueError) as error:
+        raise InvalidInputError(f"{name} is not numeric: {value!r}") from error
+
+
+def _writable(array: FloatArray) -> FloatArray:
+    """Copy a read-only array: to numba it is of another type, and all would be compiled twice."""
+    return np.require(array, requirements=["C", "W"])
 
 
 def as_transforms(value: ArrayLike) -> FloatArray:
@@ -142,7 +157,7 @@ def as_transforms(value: ArrayLike) -> FloatArray:
     Raises:
         InvalidTransformError: naming the first that is not rigid.
     """
-    T = np.ascontiguousarray(value, dtype=float)
+    T = np.ascontiguousarray(_numbers(value, "T_object_gripper"))
     if T.ndim == 2:
         T = T[None]
     if T.ndim != 3 or T.shape[1:] != (4, 4):
@@ -162,7 +177,7 @@ def as_transforms(value: ArrayLike) -> FloatArray:
 def _per_grasp(
     value: ArrayLike, name: str, count: int, *, zero_allowed: bool = False
 ) -> FloatArray:
-    array = np.asarray(value, dtype=float)
+    array = _numbers(value, name)
     if array.ndim > 1 or (array.ndim == 1 and len(array) not in (1, count)):
         raise InvalidInputError(f"{name} has shape {array.shape}, expected a number or ({count},)")
     bad = ~np.isfinite(array) | (array < 0) | ((array == 0) & (not zero_allowed))
@@ -170,7 +185,7 @@ def _per_grasp(
         positive(
             float(np.atleast_1d(array)[np.atleast_1d(bad)][0]), name, zero_allowed=zero_allowed
         )
-    return np.ascontiguousarray(np.broadcast_to(array, (count,)))
+    return _writable(np.broadcast_to(array, (count,)))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -220,6 +235,7 @@ class CompiledModel(ABC):
         friction: ArrayLike | None = None,
         mass: ArrayLike | None = None,
         com: ArrayLike | None = None,
+        opening: float | None = None,
         progress: Callable[[int], None] | None = None,
     ) -> VerdictBatch:
         """Judge many grasps on the same part, on all cores; the result does not depend on them.
@@ -231,10 +247,13 @@ class CompiledModel(ABC):
             friction: coefficient, a number or (N,); the model's own if None.
             mass: a number or (N,) [kg]; the part's own if None.
             com: center of mass, (3,) or (N, 3), object frame [m]; the part's own if None.
+            opening: distance of the pads before closing, the same for all [m]; fully open if None.
             progress: called with the number of grasps judged so far.
 
         Raises:
-            InvalidInputError: an entry is not finite, negative, or of the wrong shape.
+            InvalidTransformError: a pose is not rigid.
+            InvalidInputError: an entry is not finite, negative, or of the wrong shape; the opening
+                is beyond the gripper's.
         """
         batch = check_batch(
             scene,
@@ -244,7 +263,7 @@ class CompiledModel(ABC):
             mass=mass,
             com=com,
         )
-        return self._run(scene, batch, pads_of(scene.gripper), progress)
+        return self._run(scene, batch, pads_of(scene.gripper, opening), progress)
 
     def _run(
         self,

@@ -7,7 +7,7 @@ COMPLIANCE = 2e-4
 TORSION = 0.004
 """Torsional coefficient gamma of the soft point contact [m]: that of a pad in full flat contact,
 friction times the mean distance of its points from its center (9 mm)."""
-POSE_TRANSLATION = 0.003
+POSE_TRANSLATION = 0.001
 """Standard deviation of each coordinate of the part's pose where a station states none [m]."""
-POSE_ROTATION = 0.035
+POSE_ROTATION = 0.003
 """Standard deviation of the part's rotation about each axis where a station states none [rad]."""

@@ -141,6 +141,7 @@ class ReferenceAreaContact:
         friction: ArrayLike | None = None,
         mass: ArrayLike | None = None,
         com: ArrayLike | None = None,
+        opening: float | None = None,
         progress: Callable[[int], None] | None = None,
     ) -> VerdictBatch:
         """Judge many grasps one by one; arguments as for the compiled models."""
@@ -159,7 +160,7 @@ class ReferenceAreaContact:
         for i in range(len(batch)):
             part = replace(scene.object, mass=float(masses[i]), center_of_mass=batch.com_object[i])
             model = replace(self, friction=float(batch.friction[i]))
-            grasp = Grasp(batch.T_object_gripper[i], force=float(batch.force[i]))
+            grasp = Grasp(batch.T_object_gripper[i], opening, float(batch.force[i]))
             verdicts.append(model.evaluate(replace(scene, object=part), grasp))
             if progress:
                 progress(i + 1)

@@ -8,7 +8,6 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from reach.errors import InvalidInputError
 from reach.grasp import Grasp
 from reach.kernels.pads import pads_of
 from reach.kernels.tree import mesh_tree
@@ -19,7 +18,13 @@ from reach.models.settled import Settled, SettledContact
 from reach.models.settled_grade import GRADE, Grade
 from reach.models.settled_verdict import FATES, SettledVerdict
 from reach.pose_error import PoseError
-from reach.reliability import FRICTION_SPREAD, MASS_SPREAD, draw_samples, wilson_interval
+from reach.reliability import (
+    FRICTION_SPREAD,
+    MASS_SPREAD,
+    check_counts,
+    draw_samples,
+    wilson_interval,
+)
 from reach.scene import Scene
 
 Progress = Callable[[int], None]
@@ -205,6 +210,5 @@ def settled_robust(
     scorer = SettledRobustScorer(
         SettledContact(**overrides), error, GRADE if graded else None, **sampling
     )
-    if scorer.samples < 1:
-        raise InvalidInputError(f"samples is {scorer.samples!r}, expected at least 1")
+    check_counts(scorer.samples, 0)
     return scorer
