@@ -29,11 +29,10 @@ from reach import (
     Scene,
     reliability,
 )
-from reach.models.defaults import POSE_ROTATION, POSE_TRANSLATION
 from reach.models.reference import ReferenceAreaContact
 from reach.transforms import exp, make_transform
 
-ERROR = PoseError.isotropic(translation=POSE_TRANSLATION, rotation=POSE_ROTATION)
+ERROR = PoseError.isotropic(translation=0.003, rotation=0.035)
 
 
 def seconds(function: Callable[[], object], repeat: int = 7, least: float = 0.03) -> float:

@@ -8,9 +8,13 @@ from hypothesis import strategies as st
 
 from reach import AreaContact, Grasp, GraspObject, ParallelJawGripper, Scene, transforms
 from reach.kernels.min_norm import exit_of_ray
+from reach.kernels.pads import pads_of
 from reach.kernels.support import support
+from reach.kernels.tree import mesh_tree
+from reach.kernels.verdict import find_patch, make_workspace
 from reach.limit_surface import DIRECTIONS, TriangleContacts, overshoot
 from reach.models.reference import ReferenceAreaContact
+from reach.patch import Patch
 from reach.wrench import distance_to, friction_columns, grasp_map, linearized_margin, wrench_set
 
 EXAMPLES = settings(max_examples=30, deadline=None, derandomize=True)
@@ -163,6 +167,43 @@ def triangle_by_triangle(scene, grasp):
         for jaw in (0, 1)
     ]
     return exact_margin(contacts, np.array([0, 0, 9.81 * scene.object.mass, 0, 0, 0]))
+
+
+def triangles_by_clipping(scene, grasp, model):
+    """Every triangle that the compiled clipping finds, each with the reference's limit surface."""
+    pads, depth = pads_of(scene.gripper), min(model.compliance * grasp.force, 5.3e-3)
+    T_com_gripper = np.array(grasp.T_object_gripper)
+    T_com_gripper[:3, 3] -= scene.object.com
+    contacts = []
+    for jaw in (0, 1):
+        T_pad = pads.T_gripper_pad[jaw]
+        count, high, space = find_patch(
+            mesh_tree(scene.object),
+            pads,
+            jaw,
+            grasp.T_object_gripper @ T_pad,
+            depth,
+            make_workspace(1),
+        )
+        patch = Patch(space.triangles[:count], space.normals[:count], high - depth, depth)
+        contacts.append(model.contacts(patch, grasp.force, T_com_gripper @ T_pad))
+    return contacts
+
+
+@EXAMPLES
+@given(st.floats(-0.4, 0.4), st.floats(-0.015, 0.015), st.integers(0, 1))
+def test_without_aggregation_compiled_and_reference_differ_by_the_linearization(
+    turn, offset, level
+):
+    """On the very triangles that clipping finds: exact ellipsoids against 18 planes each."""
+    scene, grasp = scene_of(level, np.eye(4)), across(turn, offset)
+    contacts = triangles_by_clipping(scene, grasp, ReferenceAreaContact(triangles=None))
+    weight = np.array([0, 0, 9.81 * scene.object.mass, 0, 0, 0])
+    linear = linearized_margin(wrench_set(contacts, LENGTH), weight, 50.0)
+    low = exact_margin(contacts, weight)
+    high = exact_margin(scaled_friction(contacts, overshoot()), weight)
+    assert 0 < low < 50
+    assert low * (1 - 1e-3) <= linear <= high * (1 + 1e-3)
 
 
 def scene_of(level, pose):

@@ -43,6 +43,8 @@ def test_friction_is_finite_and_not_negative(model, friction):
         (PointContact, {"torsion": np.nan}, "torsion"),
         (ReferenceAreaContact, {"triangles": 0}, "triangles"),
         (AreaContact, {"margin_cap": 0}, "margin_cap"),
+        (AreaContact, {"compliance": None}, "compliance .* is None"),
+        (PointContact, {"friction": "rough"}, "friction is 'rough'"),
     ],
 )
 def test_other_parameters(model, parameters, named):
@@ -69,6 +71,10 @@ def test_batches_are_checked(model):
         model.evaluate_batch(scene(), T, force=[1.0, 2.0])
     with pytest.raises(InvalidInputError, match="center of mass"):
         model.evaluate_batch(scene(), T, com=(0, 0, np.nan))
+    with pytest.raises(InvalidInputError, match=r"center of mass has shape \(2,\)"):
+        model.evaluate_batch(scene(), T, com=(0, 0))
+    with pytest.raises(InvalidInputError, match="friction is not numeric: 'rough'"):
+        model.evaluate_batch(scene(), T, friction="rough")
     assert len(model.evaluate_batch(scene(), np.empty((0, 4, 4)))) == 0
 
 
@@ -104,3 +110,14 @@ def test_first_slow_call_is_announced_once(monkeypatch, caplog):
             pass
     messages = [r for r in caplog.records if "compiling" in r.message]
     assert len(messages) == 1
+
+
+@pytest.mark.parametrize("model", [AreaContact, EllipseContact, PointContact])
+def test_kernels_are_compiled_once_whatever_the_arrays(model):
+    """Read-only and writable arrays are different types to numba: grasps carry read-only ones."""
+    T = np.eye(4)[None]
+    model().evaluate(scene(), Grasp(T[0]))
+    model().evaluate_batch(scene(), T)
+    T.setflags(write=False)
+    model().evaluate_batch(scene(), T, force=np.broadcast_to(10.0, 1), com=scene().object.com)
+    assert len(model.kernel.signatures) == 1

@@ -103,7 +103,7 @@ def test_units_of_torque_change_nothing(seed):
     with pytest.MonkeyPatch.context() as patch:
         margins = []
         for length in (0.01, 0.03, 0.1):
-            patch.setattr("reach.models.area.TORQUE_LENGTH", length)
+            patch.setattr("reach.models.wrench_set_model.TORQUE_LENGTH", length)
             margins.append(AreaContact().evaluate(scene, grasp).margin)
     np.testing.assert_allclose(margins, margins[1], rtol=5e-3, atol=2e-3)
 

@@ -10,12 +10,14 @@ from reach import (
     Grasp,
     GraspObject,
     ParallelJawGripper,
+    PointContact,
     PoseError,
     Scene,
     reliability,
     transforms,
 )
 from reach.errors import InvalidInputError
+from reach.models.reference import ReferenceAreaContact
 from reach.reliability import draw_samples, wilson_interval
 
 
@@ -122,11 +124,44 @@ def test_a_trials_own_covariance_matters_by_direction():
     assert q_along.value > q_across.value + 0.1
 
 
+def off_the_middle(opening):
+    """A thin plate 8 mm beside the middle: a hand opened by 10 mm comes down with a jaw inside it."""
+    mesh = trimesh.creation.box((0.008, 0.03, 0.03))
+    part = GraspObject("plate", mesh.vertices, mesh.faces, 0.02)
+    grasp = Grasp(transforms.make_transform(None, (-0.012, 0, -0.160)), opening)
+    return Scene(part, ParallelJawGripper.yumi(), np.eye(4)), grasp
+
+
+@pytest.mark.parametrize("model", [AreaContact(), PointContact(), ReferenceAreaContact()])
+def test_the_opening_decides_where_the_jaws_start(model):
+    error = PoseError(np.zeros((6, 6)))
+    for opening, holds in ((None, True), (0.05, True), (0.01, False)):
+        scene, grasp = off_the_middle(opening)
+        alone = model.evaluate(scene, grasp)
+        batch = model.evaluate_batch(scene, grasp.T_object_gripper[None], opening=opening)
+        q = reliability(model, scene, grasp, pose_error=error, samples=2)
+        assert alone.resists is holds
+        assert bool(batch.resists[0]) is holds
+        assert q.value == float(holds)
+
+
+def test_an_opening_beyond_the_grippers_is_refused():
+    scene, grasp = off_the_middle(0.06)
+    with pytest.raises(InvalidInputError, match=r"opening 0.06 m .* outside 0 to 0.05"):
+        AreaContact().evaluate(scene, grasp)
+    with pytest.raises(InvalidInputError, match=r"opening 0.06 m .* outside 0 to 0.05"):
+        AreaContact().evaluate_batch(scene, grasp.T_object_gripper[None], opening=0.06)
+
+
 def test_bad_arguments():
     scene, grasp = near_the_edge()
     error = PoseError.isotropic(translation=0.001, rotation=0.01)
     with pytest.raises(InvalidInputError, match="samples is 0"):
         reliability(AreaContact(), scene, grasp, pose_error=error, samples=0)
+    with pytest.raises(InvalidInputError, match="samples is 1.5"):
+        reliability(AreaContact(), scene, grasp, pose_error=error, samples=1.5)
+    with pytest.raises(InvalidInputError, match="seed is -1"):
+        reliability(AreaContact(), scene, grasp, pose_error=error, seed=-1)
     with pytest.raises(InvalidInputError, match="friction_spread"):
         reliability(AreaContact(), scene, grasp, pose_error=error, friction_spread=-1)
     with pytest.raises(InvalidInputError, match="adaptive"):
