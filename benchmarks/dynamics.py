@@ -1,6 +1,6 @@
 """Cost and convergence of the grasp world, the simulated trial and the dynamic model.
 
-    python benchmarks/dynamics.py [--json OUT]
+    python -m benchmarks.dynamics [--json OUT]
 
 Times are CPU time of this process unless they say wall. The first call of everything is left out.
 """

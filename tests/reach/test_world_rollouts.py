@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+import hashlib
+import subprocess
+import sys
+
 import numpy as np
 import pytest
 import trimesh
@@ -70,6 +74,29 @@ def test_the_same_bits_on_one_thread_and_two() -> None:
     for name in ("outcome", "clearance", "opening", "turned", "simulated"):
         np.testing.assert_array_equal(getattr(one, name), getattr(two, name))
     assert 0 < one.lifted.sum() < 16  # the comparison would be empty if all were alike
+
+
+def digest_of_outcomes() -> str:
+    """Digest of every bit of some outcomes, lifted and not."""
+    rng = np.random.default_rng(5)
+    poses = np.array(
+        [grasp_at(rng.uniform(-0.02, 0.02), 0.0, rng.uniform(-1, 1)) for _ in range(8)]
+    )
+    outcomes = simulate_grasps(SCENE, poses, friction=rng.uniform(0.1, 0.6, 8), threads=1)
+    arrays = (outcomes.outcome, outcomes.clearance, outcomes.opening, outcomes.turned)
+    return hashlib.sha256(b"".join(each.tobytes() for each in arrays)).hexdigest()
+
+
+def test_two_processes_get_the_same_bits_as_this_one() -> None:
+    program = "import runpy, sys; print(runpy.run_path(sys.argv[1])['digest_of_outcomes']())"
+    others = [
+        subprocess.Popen(
+            [sys.executable, "-c", program, __file__], stdout=subprocess.PIPE, text=True
+        )
+        for _ in range(2)
+    ]
+    digests = {other.communicate(timeout=120)[0].strip() for other in others}
+    assert digests == {digest_of_outcomes()}
 
 
 def test_the_dynamic_score_is_seeded_and_independent_of_threads() -> None:
