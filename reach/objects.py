@@ -76,8 +76,8 @@ class GraspObject:
     ) -> GraspObject:
         """Read a mesh file (.stl, .obj, .ply, .off, .glb, ...), mending what can be mended.
 
-        Duplicate vertices are merged and inverted windings turned; a surface that stays open
-        is refused.
+        Duplicate vertices are merged, inverted windings turned and holes of three or four corners
+        closed; a surface that stays open is refused.
 
         Args:
             path: the mesh file.
@@ -194,6 +194,8 @@ def _read_mesh(path: Path) -> Any:
     mesh.merge_vertices(merge_tex=True, merge_norm=True)
     mesh.update_faces(mesh.nondegenerate_faces() & mesh.unique_faces())
     mesh.remove_unreferenced_vertices()
+    if len(mesh.faces) == 0:
+        raise InvalidMeshError(f"mesh file {str(path)!r} holds only triangles without area")
     if not mesh.is_watertight:
         trimesh.repair.fill_holes(mesh)
     trimesh.repair.fix_normals(mesh, multibody=True)

@@ -15,7 +15,7 @@ from reach import (
     PointContact,
     Scene,
 )
-from reach.errors import InvalidInputError, InvalidTransformError
+from reach.errors import InvalidInputError, InvalidMeshError, InvalidTransformError
 from reach.kernels import compiling
 from reach.models.reference import ReferenceAreaContact
 
@@ -95,6 +95,14 @@ def test_degenerate_triangles_inside_a_closed_mesh_do_no_harm():
         without = model().evaluate(whole, grasp)
         assert with_sliver.resists == without.resists
         assert with_sliver.margin == pytest.approx(without.margin, rel=1e-2)
+
+
+def test_a_file_of_triangles_without_area_is_refused(tmp_path):
+    path = tmp_path / "line.stl"
+    line = trimesh.Trimesh([(0, 0, 0), (0.01, 0, 0), (0.02, 0, 0)], [(0, 1, 2)], process=False)
+    line.export(path)
+    with pytest.raises(InvalidMeshError, match="line.stl.* only triangles without area"):
+        GraspObject.load(path, mass=0.01)
 
 
 def test_first_slow_call_is_announced_once(monkeypatch, caplog):
