@@ -154,9 +154,10 @@ def test_a_torn_or_nonsense_cache_line_costs_one_score(tmp_path):
 
 def test_scores_state_the_pose_error_they_were_computed_under():
     scorer = make_scorer("reach-robust", samples=4)
-    given = score_cases(cases(objects=1, grasps=2), scorer, pose_error=ERROR)
-    assert given.parameters["pose_translation"] == pytest.approx(1e-3)
-    assert given.parameters["pose_rotation"] == pytest.approx(3e-3)
+    error = PoseError.isotropic(translation=2.5e-3, rotation=7e-3)
+    given = score_cases(cases(objects=1, grasps=2), scorer, pose_error=error)
+    assert given.parameters["pose_translation"] == pytest.approx(2.5e-3)
+    assert given.parameters["pose_rotation"] == pytest.approx(7e-3)
     own = score_cases(cases(objects=1, grasps=2), scorer, pose_error=None)
     assert own.parameters == scorer.parameters != given.parameters
 
