@@ -16,11 +16,13 @@ from reach.transforms import exp, inverse
 from registration.mesh_model import MeshModel
 from registration.observation import Observation
 from registration.options import SensorProfile
-from registration.render_check import GRAZING
 from registration.support import Support
 
 POINTS = 1500
 STEPS = 4
+SHALLOW = 0.4
+"""No wall counts as seen at a slant of less than this cosine: its depths err more. With 0.3 the
+covariance is too small for structured light, with 0.5 too large for stereo (decision 0042)."""
 PRINT_ERROR = 3e-5
 """Standard deviation of the part's shape against its mesh, as an offset of the whole pose [m]."""
 UNKNOWN_TURN, UNKNOWN_PLACE = np.radians(60), 0.1
@@ -128,11 +130,11 @@ def _in_depth(
 
     A depth's error moves a point across a face seen at a slant by less: such faces, the walls
     that tell how a part is turned, are known better than their share of points says. Below the
-    cosine GRAZING depths err more, too.
+    cosine SHALLOW depths err more, too.
     """
     ray = points_camera / points_camera[:, 2, None]
     normal = (jacobian[:, None, 3:] * T[None, :3, :3]).sum(axis=2)
-    slope = np.maximum(np.abs((normal * ray).sum(axis=1)), GRAZING)
+    slope = np.maximum(np.abs((normal * ray).sum(axis=1)), SHALLOW)
     return residual / slope, jacobian / slope[:, None]
 
 
