@@ -49,7 +49,7 @@ def precision_recall_svg(result: Evaluation, name: str = "pr") -> str:
         axes.annotate(
             "constant 1", (0.02, base), xytext=(0, 3), textcoords="offset points", fontsize=8
         )
-        floor = np.floor(10 * lowest - 0.5) / 10  # no curve goes there: the space is for the others
+        floor = np.floor(20 * lowest - 0.5) / 20  # no curve goes there: the space is for the others
         axes.set(xlim=(0, 1.01), ylim=(max(0.0, floor), 1.01), xlabel="recall", ylabel="precision")
         canvas.legend(loc="outside lower center", fontsize=8, ncols=3)
         return to_svg(canvas, name)

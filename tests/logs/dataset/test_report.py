@@ -311,4 +311,4 @@ def test_a_step_between_segments_is_no_trend_within_them(dataset):
 def test_page_shows_agreement_of_operators_and_gain_over_the_point_model(page):
     text = parsed(page).text
     assert "agrees on 9 of 10 blind verdicts" in text and "0.79" in text
-    assert "reach against point" in text
+    assert "reach against point: AR" in text
