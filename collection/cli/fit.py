@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     from logs.registration_scatter import RegistrationScatter, Spread
     from reach.evaluation.fit import Fit
 
-UNITS = {"friction": "", "compliance": " m/N", "translation": " m"}
+UNITS = {"friction": "", "compliance": " m/N", "stiffness": " N/m^3", "translation": " m"}
 
 
 def fit(
@@ -27,7 +27,8 @@ def fit(
 ) -> None:
     """Estimate friction, compliance and pose error, with intervals.
 
-    Friction, compliance and the pose error in the hand are those under which the labels are most
+    Friction, compliance (for settled-robust the pads' stiffness) and the pose error in the hand
+    are those under which the labels are most
     likely. Tilt and height of the registered poses are compared with those of a part at rest.
     What the data cannot tell is said to be so.
 

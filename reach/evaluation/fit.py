@@ -33,6 +33,13 @@ GRID: Mapping[str, tuple[float, ...]] = {
 }
 """Friction, compliance [m/N] (20 N times the last is the pad's limit), pose error [m]."""
 
+SETTLED_GRID: Mapping[str, tuple[float, ...]] = {
+    "friction": GRID["friction"],
+    "stiffness": (3.75e7, 7.5e7, 1.5e8, 3e8, 6e8),
+    "translation": GRID["translation"],
+}
+"""The settled model has pads' stiffness k_w [N/m^3] for a compliance."""
+
 ROTATION_PER_TRANSLATION = 3.0
 """Radians of rotation error to a meter of translation error: 3 mrad to 1 mm, as in the trials."""
 CUT_OFF = 3.841458820694124
@@ -40,6 +47,11 @@ CUT_OFF = 3.841458820694124
 FEWEST_GRASPS = 8
 MakeScorer = Callable[..., Scorer]
 Progress = Callable[[int, int], None]
+
+
+def grid_of(model: str) -> Mapping[str, tuple[float, ...]]:
+    """Values of the parameters that a robust model has."""
+    return SETTLED_GRID if model.startswith("settled") else GRID
 
 
 @dataclass(frozen=True, slots=True)
@@ -105,7 +117,7 @@ def fit_parameters(
     model: str = "reach-robust",
     samples: int = 50,
     seed: int = 0,
-    grid: Mapping[str, tuple[float, ...]] = GRID,
+    grid: Mapping[str, tuple[float, ...]] | None = None,
     backend: str = "serial",
     progress: Progress | None = None,
 ) -> Fit:
@@ -117,7 +129,7 @@ def fit_parameters(
         model: a robust model.
         samples: perturbations a score.
         seed: of the perturbations, the same for every grid point.
-        grid: values of friction, compliance, and pose error.
+        grid: values of friction, compliance or stiffness, and pose error; the model's own if None.
         backend: see [score_cases][reach.evaluation.scoring.score_cases].
         progress: called with the number of grid points done, and their total.
 
@@ -128,6 +140,7 @@ def fit_parameters(
         raise InvalidInputError(
             f"{len(cases)} labeled grasps cannot tell three parameters; it takes {FEWEST_GRASPS}"
         )
+    grid = grid_of(model) if grid is None else grid
     names = tuple(grid)
     points = list(itertools.product(*grid.values()))
     likelihood = np.empty([len(values) for values in grid.values()])

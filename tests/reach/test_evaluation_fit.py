@@ -6,7 +6,12 @@ import trimesh
 
 from reach.errors import InvalidInputError
 from reach.evaluation.cases import GraspCase
-from reach.evaluation.fit import ROTATION_PER_TRANSLATION, fit_parameters, log_likelihood
+from reach.evaluation.fit import (
+    ROTATION_PER_TRANSLATION,
+    fit_parameters,
+    grid_of,
+    log_likelihood,
+)
 from reach.grasp import Grasp
 from reach.gripper import ParallelJawGripper
 from reach.models.registry import make_scorer
@@ -72,6 +77,22 @@ def test_friction_on_a_light_part_cannot_be_told():
     assert not friction.told
     assert friction.to_json()["best"] is None
     assert (friction.low, friction.high) == (0.15, 1.0)
+
+
+@pytest.mark.parametrize("model", ["reach-robust", "settled-robust"])
+def test_every_grid_names_parameters_that_its_model_has(model):
+    values = {name: each[0] for name, each in grid_of(model).items() if name != "translation"}
+    scorer = make_scorer(model, samples=1, **values)
+    assert {name: scorer.parameters[name] for name in values} == values
+
+
+def test_a_settled_model_is_fitted_for_its_pads_stiffness():
+    cases = labeled(mass=0.003, friction=0.4, translation=5e-4, yaw=0.02, grasps=8)
+    grid = {"friction": (0.4,), "stiffness": (7.5e7, 3e8), "translation": (5e-4,)}
+    found = fit_parameters(cases, make_scorer, model="settled-robust", samples=5, grid=grid)
+    stiffness = found.parameters["stiffness"]
+    assert stiffness.best in grid["stiffness"]
+    assert stiffness.profile[stiffness.best] == 0.0 >= min(stiffness.profile.values())
 
 
 def test_likelihood_by_hand():
