@@ -141,7 +141,8 @@ class _DrawnScene:
 
     def _place_fingers(self, simulation: Simulation) -> None:
         """Move the finger's solids to the jaws' opening; they are drawn, not jointed."""
-        boxes = simulation.gripper.boxes(simulation.opening)
+        # Soft pads that press on one another are a little less than closed.
+        boxes = simulation.gripper.boxes(max(simulation.opening, 0.0))
         names = [n for n in range(self._model.ngeom) if "gripper_" in self._model.geom(n).name]
         for geom, box in zip(names, boxes, strict=True):
             self._model.geom_pos[geom] = box.T_gripper_box[:3, 3]

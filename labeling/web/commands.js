@@ -3,6 +3,8 @@
 import { receipt } from "/draw.js";
 import { play } from "/sound.js";
 
+const SLOW_MS = 120;
+
 export function refuse(message, seconds = 4) {
   receipt("refused", message, seconds);
   play("refused");
@@ -24,9 +26,10 @@ export class Commands {
     if (this.pending && !stop) return refuse("the last command has no answer yet");
     const pending = { ...command, id: crypto.randomUUID() };
     if (!stop) this.pending = pending;
-    const answering = this.link.send(pending);
-    this.onChange();
-    const answer = await answering;
+    // Drawn only if the answer takes its time: the browser would put that frame before the answer.
+    const slow = setTimeout(() => this.onChange(), SLOW_MS);
+    const answer = await this.link.send(pending);
+    clearTimeout(slow);
     if (answer.status !== "unconfirmed") return this.settle(answer, pending, said);
     if (stop) refuse("THE STOP WAS NOT CONFIRMED: use the hardware stop", 10);
     else this.pending = { ...pending, unconfirmed: true, said };

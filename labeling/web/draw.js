@@ -154,6 +154,7 @@ export function trialItem(trial, chosen, onChoose) {
 }
 
 let receiptTimer = 0;
+const still = matchMedia("(prefers-reduced-motion: reduce)");
 
 export function receipt(kind, message, seconds = 2.2) {
   const output = byId("receipt");
@@ -162,7 +163,7 @@ export function receipt(kind, message, seconds = 2.2) {
   if (kind === "stored") byId("last-stored").textContent = `✓ ${message}`;
   clearTimeout(receiptTimer);
   receiptTimer = setTimeout(() => { output.dataset.kind = "none"; }, seconds * 1000);
-  document.body.classList.remove("flash-stored", "flash-refused");
-  void document.body.offsetWidth; // restarts the animation
-  document.body.classList.add(`flash-${kind}`);
+  const frame = byId("flash");
+  frame.dataset.kind = kind;
+  frame.animate({ opacity: [1, 0] }, still.matches ? 1 : 600); // asks for no layout of the page
 }
