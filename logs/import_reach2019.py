@@ -172,8 +172,9 @@ def _load_objects(
             known = [stem for stem, p in found.items() if p.suffix.lower() in MESH_SUFFIXES]
             raise UnknownNameError(f"object (no mesh in {meshes})", name, known)
         mass, sources[name] = rule.mass(name)
+        # Published trials cannot be run again with a better mesh: mend theirs, and tell.
         objects[name] = GraspObject.load(
-            path, mass=mass, density=rule.density, infill=rule.infill, name=name
+            path, mass=mass, density=rule.density, infill=rule.infill, name=name, repair=True
         )
     return objects, sources
 

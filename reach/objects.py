@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import logging
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -16,6 +17,8 @@ from reach.errors import InvalidMeshError, UnknownNameError
 
 if TYPE_CHECKING:
     import trimesh
+
+LOGGER = logging.getLogger(__name__)
 
 MESH_UNITS = {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "in": 0.0254}
 PLA_DENSITY = 1240.0
@@ -73,11 +76,13 @@ class GraspObject:
         infill: float = 1.0,
         unit: str = "m",
         name: str | None = None,
+        repair: bool = False,
     ) -> GraspObject:
-        """Read a mesh file (.stl, .obj, .ply, .off, .glb, ...), mending what can be mended.
+        """Read a mesh file (.stl, .obj, .ply, .off, .glb, ...).
 
-        Duplicate vertices are merged, inverted windings turned and holes of three or four corners
-        closed; a surface that stays open is refused.
+        What a file format tears apart is joined again (equal vertices are merged, repeated faces
+        and faces without area dropped); what says something else than a closed surface with
+        outward faces is refused, or mended and told in the log if that is asked for.
 
         Args:
             path: the mesh file.
@@ -86,13 +91,17 @@ class GraspObject:
             infill: printed share of the volume, in (0, 1].
             unit: unit of the file's numbers: m, cm, mm or in.
             name: default is the file's stem.
+            repair: close holes of three or four corners and turn inverted faces, with one warning
+                in the log for each; a surface that stays open is refused all the same.
 
         Raises:
-            InvalidMeshError: unreadable, open, degenerate or absurdly sized mesh.
+            InvalidMeshError: unreadable, open, inverted, degenerate or absurdly sized mesh.
             UnknownNameError: unknown unit.
         """
         path = Path(path)
         mesh = _read_mesh(path)
+        if repair:
+            _mend(mesh, path)
         if unit not in MESH_UNITS:
             raise UnknownNameError("mesh unit", unit, MESH_UNITS)
         name = name or path.stem
@@ -196,10 +205,22 @@ def _read_mesh(path: Path) -> Any:
     mesh.remove_unreferenced_vertices()
     if len(mesh.faces) == 0:
         raise InvalidMeshError(f"mesh file {str(path)!r} holds only triangles without area")
+    return mesh
+
+
+def _mend(mesh: trimesh.Trimesh, path: Path) -> None:
+    """Close small holes and turn inverted faces, and say what was done."""
+    import trimesh
+
+    before = len(mesh.faces)
     if not mesh.is_watertight:
         trimesh.repair.fill_holes(mesh)
+    if added := len(mesh.faces) - before:
+        LOGGER.warning("mesh %s has holes: closed them with %d triangles", path, added)
+    read = np.array(mesh.faces)
     trimesh.repair.fix_normals(mesh, multibody=True)
-    return mesh
+    if turned := int(np.any(read != mesh.faces, axis=1).sum()):
+        LOGGER.warning("mesh %s has inverted faces: turned %d of %d", path, turned, len(read))
 
 
 def _check_closed(name: str, vertices: FloatArray, faces: IntArray) -> None:
@@ -222,5 +243,5 @@ def _check_closed(name: str, vertices: FloatArray, faces: IntArray) -> None:
     volume, _ = volume_and_centroid(vertices, faces)
     if volume <= 0:
         raise InvalidMeshError(
-            f"mesh {name!r} encloses {volume:.3g} m^3: flat, or turned inside out"
+            f"mesh {name!r} encloses {volume:.3g} m^3: flat, or turned inside out (normals point inward)"
         )

@@ -1,4 +1,4 @@
-"""Read a user's mesh; mend what has one meaning, refuse the rest in one line."""
+"""Read a user's mesh; join solids that overlap, refuse what is no solid in one line."""
 
 from __future__ import annotations
 
@@ -31,7 +31,8 @@ def read_part(path: Path, unit: str) -> GraspObject:
         unit: of its numbers: m, cm, mm or in.
 
     Raises:
-        InvalidMeshError: unreadable, open, flat or absurdly sized; or pieces that do not touch.
+        InvalidMeshError: unreadable, open, inverted, flat or absurdly sized; or pieces that do
+            not touch or enclose a hollow.
         UnknownNameError: unknown unit.
     """
     part = GraspObject.load(path, unit=unit)
@@ -80,6 +81,11 @@ def _manifold(name: str, piece: trimesh.Trimesh) -> Manifold:
     if solid.status() != Error.NoError or solid.is_empty():
         raise InvalidMeshError(
             f"mesh {name!r} has several pieces and one is no solid ({solid.status().name})"
+        )
+    if solid.volume() <= 0:
+        raise InvalidMeshError(
+            f"mesh {name!r} has several pieces and one encloses {solid.volume():.3g} m^3: "
+            "turned inside out, or a hollow"
         )
     return solid
 

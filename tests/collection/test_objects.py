@@ -137,6 +137,13 @@ def test_overlapping_solids_are_joined(tmp_path):
     assert part.mass == pytest.approx(printed_mass(part.vertices, part.faces))
 
 
+def test_a_piece_turned_inside_out_is_refused(tmp_path):
+    second = box((0.01,) * 3, (0.012, 0.001, 0.002))
+    second.invert()
+    pair = trimesh.util.concatenate([box((0.02,) * 3), second])
+    assert "turned inside out" in refused(write(tmp_path / "pair.stl", pair))
+
+
 def test_pieces_that_do_not_touch_are_refused(tmp_path):
     pair = trimesh.util.concatenate([box((0.02,) * 3), box((0.02,) * 3, (0.05, 0, 0))])
     assert "2 pieces" in refused(write(tmp_path / "pair.stl", pair))

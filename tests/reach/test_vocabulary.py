@@ -64,12 +64,49 @@ def test_mass_is_positive(mass):
         GraspObject("part", box().vertices, box().faces, mass)
 
 
-def test_reading_mends_inverted_files_and_refuses_text(tmp_path):
-    inverted = tmp_path / "inverted.stl"
+def _written(tmp_path, name, change):
+    path = tmp_path / name
     mesh = box()
-    mesh.invert()
-    mesh.export(inverted)
-    assert GraspObject.load(inverted).volume > 0
+    change(mesh)
+    mesh.export(path)
+    return path
+
+
+def _open(mesh):
+    mesh.update_faces(np.arange(len(mesh.faces)) > 0)
+
+
+def _turn_one_face(mesh):
+    mesh.faces[0] = mesh.faces[0, ::-1]
+
+
+@pytest.mark.parametrize(
+    ("change", "complaint", "told"),
+    [
+        (trimesh.Trimesh.invert, "inside out", "turned 12 of 12"),
+        (_turn_one_face, "no partner|winding", "turned 1 of 12"),
+        (_open, "not watertight", "closed them with 1 triangles"),
+    ],
+    ids=["inverted", "one face inverted", "open"],
+)
+def test_reading_refuses_a_bad_surface_and_mends_it_only_on_demand(
+    tmp_path, caplog, change, complaint, told
+):
+    path = _written(tmp_path, "part.stl", change)
+    with pytest.raises(InvalidMeshError, match=f"'part'.*({complaint})"):
+        GraspObject.load(path)
+    assert not caplog.records
+    assert GraspObject.load(path, repair=True).volume == pytest.approx(box().volume)
+    assert [told in record.getMessage() for record in caplog.records] == [True]
+
+
+def test_reading_a_sound_file_with_repair_tells_nothing(tmp_path, caplog):
+    path = _written(tmp_path, "part.stl", lambda mesh: None)
+    assert GraspObject.load(path, repair=True).volume == pytest.approx(box().volume)
+    assert not caplog.records
+
+
+def test_reading_refuses_text_and_absent_files(tmp_path):
     text = tmp_path / "text.stl"
     text.write_text("this is no mesh")
     with pytest.raises(InvalidMeshError, match="text.stl"):
