@@ -26,7 +26,7 @@ from reach.grasp import Grasp
 from reach.gripper import ParallelJawGripper
 from reach.models.defaults import FRICTION
 from reach.pose_error import PoseError
-from reach.reliability import draw_samples
+from reach.robustness import draw_samples
 from reach.scene import Scene
 from reach.stable_poses import stable_poses
 from reach.world.parameters import WorldParameters

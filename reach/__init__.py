@@ -6,24 +6,23 @@ Names are imported when first used, because numba and trimesh each take about a 
 from __future__ import annotations
 
 import importlib
-import sys
-from types import ModuleType
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from reach.errors import ReachError
-    from reach.grasp import Grasp
-    from reach.gripper import Pad, ParallelJawGripper
-    from reach.models.area import AreaContact
-    from reach.models.ellipse import EllipseContact
-    from reach.models.point import PointContact
-    from reach.models.settled import SettledContact
-    from reach.objects import GraspObject
-    from reach.pose_error import PoseError
-    from reach.reliability import reliability
-    from reach.scene import Scene
+    from reach.errors import ReachError as ReachError
+    from reach.grasp import Grasp as Grasp
+    from reach.gripper import Pad as Pad
+    from reach.gripper import ParallelJawGripper as ParallelJawGripper
+    from reach.models.area import AreaContact as AreaContact
+    from reach.models.ellipse import EllipseContact as EllipseContact
+    from reach.models.point import PointContact as PointContact
+    from reach.models.settled import SettledContact as SettledContact
+    from reach.objects import GraspObject as GraspObject
+    from reach.pose_error import PoseError as PoseError
+    from reach.robustness import reliability as reliability
+    from reach.scene import Scene as Scene
 
-_HOME = {
+_HOME = {  # the module of every public name, as above
     "AreaContact": "reach.models.area",
     "EllipseContact": "reach.models.ellipse",
     "Grasp": "reach.grasp",
@@ -35,35 +34,10 @@ _HOME = {
     "ReachError": "reach.errors",
     "Scene": "reach.scene",
     "SettledContact": "reach.models.settled",
-    "reliability": "reach.reliability",
+    "reliability": "reach.robustness",
 }
 
-__all__ = [
-    "AreaContact",
-    "EllipseContact",
-    "Grasp",
-    "GraspObject",
-    "Pad",
-    "ParallelJawGripper",
-    "PointContact",
-    "PoseError",
-    "ReachError",
-    "Scene",
-    "SettledContact",
-    "reliability",
-]
-
-
-class _Package(ModuleType):
-    """Keeps `reach.reliability` the function when the module of the same name is imported."""
-
-    def __setattr__(self, name: str, value: Any) -> None:
-        if name == "reliability" and isinstance(value, ModuleType):
-            value = value.reliability
-        super().__setattr__(name, value)
-
-
-sys.modules[__name__].__class__ = _Package
+__all__ = [*_HOME]
 
 
 def __getattr__(name: str) -> Any:

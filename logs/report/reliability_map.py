@@ -88,7 +88,7 @@ def reliabilities(
     seed: int = 0,
 ) -> FloatArray:
     """Reliability of each probe grasp under a model, shape (N,)."""
-    from reach.reliability import reliability
+    from reach.robustness import reliability
 
     scene = Scene(part, gripper, T_world_object)
     return np.array(

@@ -18,7 +18,7 @@ from reach.models.ellipse import EllipseContact
 from reach.models.point import PointContact
 from reach.models.registry import Score, Scorer
 from reach.pose_error import PoseError
-from reach.reliability import FRICTION_SPREAD, MASS_SPREAD, check_counts, reliability
+from reach.robustness import FRICTION_SPREAD, MASS_SPREAD, check_counts, reliability
 from reach.scene import Scene
 
 

@@ -20,7 +20,7 @@ from reach.grasp import Grasp
 from reach.models.defaults import FRICTION, POSE_ROTATION, POSE_TRANSLATION
 from reach.models.registry import Score
 from reach.pose_error import PoseError
-from reach.reliability import FRICTION_SPREAD, MASS_SPREAD, draw_samples, wilson_interval
+from reach.robustness import FRICTION_SPREAD, MASS_SPREAD, draw_samples, wilson_interval
 from reach.scene import Scene
 from reach.world.parameters import WorldParameters
 from reach.world.rollouts import LiftOutcomes, Outcome, simulate_grasps

@@ -18,7 +18,7 @@ from reach.models.settled import Settled, SettledContact
 from reach.models.settled_grade import GRADE, Grade
 from reach.models.settled_verdict import FATES, SettledVerdict
 from reach.pose_error import PoseError
-from reach.reliability import (
+from reach.robustness import (
     FRICTION_SPREAD,
     MASS_SPREAD,
     check_counts,
@@ -179,7 +179,7 @@ class SettledRobustScorer(_ManyScores):
     def settled_samples(
         self, scene: Scene, grasp: Grasp, pose_error: PoseError, seed: int
     ) -> Settled:
-        """Settle every sample of [draw_samples][reach.reliability.draw_samples]."""
+        """Settle every sample of [draw_samples][reach.robustness.draw_samples]."""
         T, factor, mass = draw_samples(
             scene, grasp, pose_error, self.samples, seed, self.friction_spread, self.mass_spread
         )

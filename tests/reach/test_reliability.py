@@ -18,7 +18,7 @@ from reach import (
 )
 from reach.errors import InvalidInputError
 from reach.models.reference import ReferenceAreaContact
-from reach.reliability import draw_samples, wilson_interval
+from reach.robustness import draw_samples, wilson_interval
 
 
 def near_the_edge(y=0.014):
@@ -27,13 +27,6 @@ def near_the_edge(y=0.014):
     part = GraspObject("cube", mesh.vertices, mesh.faces, 0.5)
     grasp = Grasp(transforms.make_transform(None, (0, y, -0.160)))
     return Scene(part, ParallelJawGripper.yumi(), np.eye(4)), grasp
-
-
-def test_the_package_offers_the_function_even_after_the_module_is_imported():
-    import reach.reliability  # noqa: F401
-
-    assert callable(reach.reliability)
-    assert reach.reliability is reliability
 
 
 def test_without_error_reliability_is_the_verdict():

@@ -1,5 +1,9 @@
 """Objects, pads and grasps refuse nonsense, and know their own geometry."""
 
+import ast
+import importlib
+from pathlib import Path
+
 import numpy as np
 import pytest
 import trimesh
@@ -25,6 +29,27 @@ def test_every_public_name_is_there():
         assert getattr(reach, name).__name__ == name
     with pytest.raises(AttributeError, match="no attribute"):
         reach.nothing  # noqa: B018
+
+
+def test_what_type_checkers_see_is_what_is_imported():
+    """The names imported for type checkers are those of `__all__`, from the same modules."""
+    tree = ast.parse(Path(reach.__file__).read_text())
+    seen = {
+        name.asname: node.module
+        for block in tree.body
+        if isinstance(block, ast.If)
+        for node in block.body
+        for name in node.names
+    }
+    assert sorted(seen) == reach.__all__
+    for name, module in seen.items():
+        assert getattr(importlib.import_module(module), name) is getattr(reach, name)
+
+
+def test_no_module_of_the_package_bears_a_public_name():
+    """Importing it would put the module in the name's place."""
+    modules = {path.stem for path in Path(reach.__file__).parent.iterdir()}
+    assert not modules & set(reach.__all__)
 
 
 def test_volume_and_centroid_of_a_shifted_box():
