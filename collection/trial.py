@@ -153,7 +153,6 @@ def _attempt(context: TrialContext, take: Take) -> _Attempt:
 def _place(attempt: _Attempt) -> None:
     """Wait for the operator; where the table is simulated, the object appears on it now."""
     attempt.take.wait_placed()
-    _wake(attempt.station.arm)
     simulation = attempt.station.simulation
     if simulation is None:
         return
@@ -167,7 +166,7 @@ def _place(attempt: _Attempt) -> None:
 
 
 def _wake(arm: Arm) -> None:
-    """Let an arm follow again that was stopped, and released, while the part was placed.
+    """Let an arm follow again that was stopped, and released, before this take moved anything.
 
     Nothing had moved, so there is nothing to recover from. Motors that are off stay off.
     """
@@ -273,6 +272,7 @@ def _execute(attempt: _Attempt, T_world_object: FloatArray, recorder: TrialRecor
     station = attempt.station
     true_errors = _true_errors(attempt, T_world_object)
     attempt.take.advance(Phase.EXECUTE)
+    _wake(station.arm)
     watch = TrialWatch(station, recorder)
     try:
         execution = execute_grasp(
