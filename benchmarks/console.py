@@ -29,7 +29,7 @@ from labeling.console import Console
 from labeling.controller import SessionController
 from labeling.errors import SessionEndingError
 from labeling.server import ConsoleServer, free_port
-from logs.events import Noted, Phase, SensorVerdict, Source
+from logs.events import Noted, Phase, Scored, SensorVerdict, Source
 from logs.mirror import AnnotationMirror
 from logs.mirrored_journal import MirroredJournal
 from logs.session import SessionDescriptor, SessionFolder, open_segment
@@ -81,7 +81,15 @@ def run_loop(controller: SessionController, folder: SessionFolder) -> None:
             take.await_label()
             take.reset()
             for n in range(MODELS):
-                take.record_score(f"model-{n}", "1", 0.5, {})
+                controller.record(
+                    Scored(
+                        trial_id=take.trial_id,
+                        take=take.number,
+                        model=f"model-{n}",
+                        version="1",
+                        value=0.5,
+                    )
+                )
     except SessionEndingError:
         return
 

@@ -346,8 +346,7 @@ class SessionController:
         if getattr(value, "found_by", None) == "disagreement":
             return False
         trial = self._state.trials.get(command.trial_id or "")
-        take = trial.valid_take if trial else None
-        return take is None or actor.operator not in take.revealed_to
+        return trial is None or actor.operator not in self._state.shown_to(trial)
 
     def _revision(self, command: Command) -> int:
         trial = self._state.trials.get(command.trial_id or "")

@@ -140,21 +140,6 @@ class Take:
                 ev.Voided(trial_id=self.trial_id, take=self.number, reason=reason)
             )
 
-    def record_score(
-        self, model: str, version: str, value: float, details: Mapping[str, JsonValue]
-    ) -> None:
-        """Store a model's prediction; the console shows it once the label is stored."""
-        self._controller.record(
-            ev.Scored(
-                trial_id=self.trial_id,
-                take=self.number,
-                model=model,
-                version=version,
-                value=value,
-                details=dict(details),
-            )
-        )
-
     def reset(self) -> None:
         """The robot goes home and clears the table, whatever was decided."""
         self._enter(Phase.RESET, {})

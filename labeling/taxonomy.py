@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Final
 
-from logs.events import FailureReason, Outcome, RedoCause
+from logs.events import FailureReason, RedoCause
 
 RULE: Final = (
     "Success: the object is clear of the table by 50 mm and still held after 1 s."
@@ -39,8 +39,3 @@ KEYS: Final[dict[str, str]] = {
     "stop": "Escape",
 }
 """Default key per action, far apart for the two that matter; the page lets them be remapped."""
-
-OUTCOME_TEXT: Final[dict[Outcome, str]] = {
-    Outcome.SUCCESS: "success",
-    Outcome.FAILURE: "failure",
-}

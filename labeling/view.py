@@ -1,4 +1,4 @@
-"""What the consoles show: the state in JSON, blind to every prediction until a label is stored."""
+"""What the consoles show: the state in JSON, without a prediction for what is yet to be labeled."""
 
 from __future__ import annotations
 
@@ -176,10 +176,13 @@ def _history(state: SessionState) -> list[View]:
         )
     ]
     settled.sort(key=lambda pair: pair[1].executed_ns or 0, reverse=True)
-    return [_settled(trial, take) for trial, take in settled[:HISTORY_LENGTH]]
+    return [
+        _settled(trial, take, scores=state.shows_scores(trial))
+        for trial, take in settled[:HISTORY_LENGTH]
+    ]
 
 
-def _settled(trial: TrialState, take: TakeState) -> View:
+def _settled(trial: TrialState, take: TakeState, *, scores: bool) -> View:
     shown: View = {
         "trial_id": trial.trial_id,
         "rev": trial.rev,
@@ -189,8 +192,7 @@ def _settled(trial: TrialState, take: TakeState) -> View:
         "status": trial.status,
         "label": label_view(take),
     }
-    if trial.status == "labelled":  # only now may a prediction be seen
-        shown["sensor_lifted"] = take.sensor.lifted if take.sensor else None
+    if scores and trial.status == "labelled":
         shown["scores"] = {model: score.value for model, score in take.scores.items()}
     return shown
 

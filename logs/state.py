@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 
 from logs import events as ev
+from logs.disclosure import Disclosure
 from logs.events import AnyEvent, Entry, Outcome, Phase
 from logs.trial_state import Counts, PlannedEntry, TakeState, TakeStatus, TrialState
 
@@ -30,6 +31,7 @@ class SessionState:
         self.trials: dict[str, TrialState] = {
             entry.trial_id: TrialState(entry) for entry in planned
         }
+        self._disclosure = Disclosure(self.trials.values())
         self.current: str | None = None
         self.paused = False
         self.stopped = False
@@ -41,7 +43,6 @@ class SessionState:
         self.fingerprints: dict[str, str] = {}
         self.segments: list[ev.SessionOpened] = []
         self.closed: ev.SessionClosed | None = None
-        self.simulated_labels = False
         self.notes: list[str] = []
         self.seq = 0
 
@@ -82,6 +83,14 @@ class SessionState:
             ),
         )
 
+    def shows_scores(self, trial: TrialState) -> bool:
+        """True if a console may show the trial's scores: nobody is to label its grasp blindly."""
+        return self._disclosure.shows(trial.planned.grasp_id)
+
+    def shown_to(self, trial: TrialState) -> frozenset[str]:
+        """The operators who have seen a prediction for the trial's grasp."""
+        return self._disclosure.seen_by(trial.planned.grasp_id)
+
     def next_work(self) -> TrialState | None:
         """The trial to attend to next: first those that only lack a label, then the plan's."""
         for wanted in ("unlabelled", "running", "pending"):
@@ -107,13 +116,14 @@ class SessionState:
         command = getattr(event, "command_id", None)
         if command is not None:
             self.commands[command] = entry
-        if getattr(event, "source", None) is ev.Source.OPERATOR_SIM:
-            self.simulated_labels = True
         trial_id = getattr(event, "trial_id", None)
         if trial_id is None:
             self._apply_control(entry)
         elif trial_id in self.trials:
-            self._apply_trial(self.trials[trial_id], entry)
+            trial = self.trials[trial_id]
+            self._apply_trial(trial, entry)
+            leader = self.segments[-1].operator if self.segments else None
+            self._disclosure.note(trial.planned.grasp_id, leader)
 
     def _apply_control(self, entry: Entry) -> None:
         event = entry.event
@@ -150,6 +160,7 @@ class SessionState:
         self.closed = None
         self.paused = self.stopped = False
         self.holds.clear()
+        self._disclosure.note_all(event.operator)
 
     def _stop(self) -> None:
         self.stopped = True
@@ -170,9 +181,7 @@ class SessionState:
         event = entry.event
         match event:
             case ev.Scored():
-                take = trial.find_take(event.take)
-                take.scores[event.model] = event
-                take.revealed_to |= {label.operator for _, label in take.labels}
+                trial.find_take(event.take).scores[event.model] = event
                 return
             case ev.Noted():
                 trial.notes.append(event.text)
@@ -232,10 +241,7 @@ class SessionState:
     def _decide(self, trial: TrialState, entry: Entry) -> None:
         match entry.event:
             case ev.Labelled() | ev.Relabelled() as event:
-                take = trial.find_take(event.take)
-                take.labels.append((entry, event))
-                if take.scores and event.kind == "label":
-                    take.revealed_to.add(event.operator)
+                trial.find_take(event.take).labels.append((entry, event))
                 trial.needs_label = ""
                 trial.decisions.append(entry)
             case ev.Redone() as event:

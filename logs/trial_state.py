@@ -35,7 +35,6 @@ class TakeState:
         take: counts from 1.
         segment: of the session in which it was executed: grows with each accepted change of set-up.
         labels: all verdicts that hold, oldest first.
-        revealed_to: operators who were shown a prediction once their label was stored.
         stopped: the software stop was pressed between placing and the end of the motion.
     """
 
@@ -54,7 +53,6 @@ class TakeState:
     labels: list[tuple[Entry, LabelEvent]] = field(default_factory=list)
     second_labels: dict[str, LabelEvent] = field(default_factory=dict)
     stopped: bool = False
-    revealed_to: set[str] = field(default_factory=set)
     scores: dict[str, ev.Scored] = field(default_factory=dict)
     ended_because: str = ""
 

@@ -20,7 +20,7 @@ from labeling.controller import SessionController
 from labeling.pictures import PictureShelf
 from labeling.server import ConsoleServer, free_port
 from labeling.take import Take
-from logs.events import Phase, SensorVerdict, Source
+from logs.events import Phase, Scored, SensorVerdict, Source
 from logs.session import SessionDescriptor, SessionFolder, open_segment
 from logs.state import PlannedEntry, SessionState, TrialState
 
@@ -51,11 +51,11 @@ def describe(trials: int) -> SessionDescriptor:
 class Bench:
     """A controller with the loop's steps and an operator's commands at hand, in one thread."""
 
-    def __init__(self, folder: SessionFolder, **options: Any) -> None:
+    def __init__(self, folder: SessionFolder, *, operator: str = "ann", **options: Any) -> None:
         self.folder = folder
         journal = folder.open_journal()
         self.state = SessionState.fold(folder.descriptor.trials, journal.entries)
-        open_segment(journal, self.state, SETUP, operator="ann", source=Source.OPERATOR)
+        open_segment(journal, self.state, SETUP, operator=operator, source=Source.OPERATOR)
         self.controller = SessionController(journal, self.state, **options)
 
     def trial(self, number: int) -> TrialState:
@@ -96,6 +96,13 @@ class Bench:
         number = next(t.planned.number for t in self.state.order if t.trial_id == take.trial_id)
         assert self.do("label", number, outcome=outcome, **value).status == "stored"
         return take
+
+    def score(self, number: int, value: float, *, model: str = "reach", take: int = 1) -> None:
+        """A model's prediction, as the session's background stores it."""
+        trial_id = self.trial(number).trial_id
+        self.controller.record(
+            Scored(trial_id=trial_id, take=take, model=model, version="1", value=value)
+        )
 
 
 @pytest.fixture

@@ -14,7 +14,7 @@ from labeling.auto import AutoOperator
 from labeling.controller import SessionController
 from labeling.errors import SessionEndingError, TakeEndedError
 from labeling.take import Take
-from logs.events import FailureReason, Outcome, Phase, SensorVerdict, Source, TrueOutcome
+from logs.events import FailureReason, Outcome, Phase, Scored, SensorVerdict, Source, TrueOutcome
 from logs.session import SessionDescriptor, SessionFolder, open_segment
 from logs.state import PlannedEntry, SessionState
 
@@ -74,7 +74,10 @@ def run_loop(folder: SessionFolder, controller: SessionController) -> None:
             if not take.executed:
                 run_take(folder, take, work.planned.number)
             if take.executed and take.await_label().kind == "label":
-                take.record_score("reach", "1", 0.5, {})
+                score = Scored(
+                    trial_id=take.trial_id, take=take.number, model="reach", version="1", value=0.5
+                )
+                controller.record(score)
             take.reset()
         except TakeEndedError:
             continue

@@ -117,19 +117,18 @@ def test_the_stream_ticks_while_nothing_happens(bench: Any, serve: Any, client_o
     assert first[1]["tick"] < second[1]["tick"] < third[1]["tick"]
 
 
-def test_predictions_and_sensors_appear_only_with_the_stored_label(
+def test_predictions_appear_only_with_the_stored_label(
     bench: Any, serve: Any, client_of: Any
 ) -> None:
     client = client_of(serve(bench))
-    take = bench.executed()
-    take.record_score("reach", "1", 0.987654, {"margin": 0.5})
+    bench.executed()
+    bench.score(1, 0.987654)
     for _ in range(2):
         before = client.get("/api/view").text
-        assert "0.987654" not in before and "sensor" not in before and "scores" not in before
+        assert "0.987654" not in before and "scores" not in before
     post(client, bench, "label", 1, outcome="success")
     after = client.get("/api/view").json()["history"][0]
     assert after["scores"] == {"reach": 0.987654}
-    assert after["sensor_lifted"] is True
     post(client, bench, "redo", 1, cause="seeing")
     bench.executed()
     assert "0.987654" not in client.get("/api/view").text
@@ -138,8 +137,8 @@ def test_predictions_and_sensors_appear_only_with_the_stored_label(
 def test_the_review_hides_predictions_and_from_a_second_operator_the_label(
     bench: Any, serve: Any, client_of: Any
 ) -> None:
-    take = bench.labelled("failure", reason="missed")
-    take.record_score("reach", "1", 0.987654, {})
+    bench.labelled("failure", reason="missed")
+    bench.score(1, 0.987654)
     bench.labelled("success")
     plain = client_of(serve(bench, mode="review"))
     second = client_of(serve(bench, mode="review", second=True))
@@ -165,8 +164,10 @@ def test_the_review_hides_predictions_and_from_a_second_operator_the_label(
 def test_the_review_filters(
     bench: Any, serve: Any, client_of: Any, wanted: dict[str, Any], numbers: list[int]
 ) -> None:
-    bench.labelled("failure", reason="missed").record_score("reach", "1", 0.9, {})
-    bench.labelled("success").record_score("reach", "1", 0.8, {})
+    bench.labelled("failure", reason="missed")
+    bench.labelled("success")
+    bench.score(1, 0.9)
+    bench.score(2, 0.8)
     client = client_of(serve(bench, mode="review"))
     found = client.get("/api/review", params=wanted).json()
     assert [item["number"] for item in found["trials"]] == numbers
@@ -249,7 +250,8 @@ def test_a_key_press_is_stored_within_forty_milliseconds(
 
 
 def test_a_review_shows_no_verdicts_beside_the_list(bench: Any, serve: Any, client_of: Any) -> None:
-    bench.labelled("failure", reason="missed").record_score("reach", "1", 0.987654, {})
+    bench.labelled("failure", reason="missed")
+    bench.score(1, 0.987654)
     client = client_of(serve(bench, mode="review", second=True))
     view = client.get("/api/view")
     assert "missed" not in view.text and "0.987" not in view.text

@@ -225,7 +225,7 @@ def test_ambiguous_poses_are_chosen_by_digit(
 
 
 def test_predictions_are_drawn_only_after_the_label(bench: Any, awaiting: Page) -> None:
-    bench.controller.begin(bench.trial(1)).record_score("reach", "1", 0.4321, {})
+    bench.score(1, 0.4321)
     awaiting.press("t")
     awaiting.wait("return document.getElementById('do-rotated').ariaPressed === 'true'")
     assert "0.43" not in awaiting.driver.page_source
@@ -377,9 +377,8 @@ def test_a_button_under_the_finger_stays_while_views_arrive(bench: Any, awaiting
     awaiting.press("f")
     awaiting.wait("return !document.getElementById('choices').hidden")
     awaiting.run("window.pressed = document.querySelector('#choices button')")
-    take = bench.controller.begin(bench.trial(1))
     for score in range(3):
-        take.record_score(f"model-{score}", "1", 0.5, {})
+        bench.score(1, 0.5, model=f"model-{score}")
     bench.controller.set_light("camera", ok=True)
     awaiting.wait("return document.getElementById('light-camera').dataset.light === 'good'")
     assert awaiting.run("return window.pressed.isConnected")

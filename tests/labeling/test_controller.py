@@ -396,8 +396,8 @@ def test_a_label_that_cannot_be_stored_is_not_acknowledged(
 
 
 def test_who_saw_a_prediction_is_no_longer_blind(bench: Any) -> None:
-    take = bench.labelled()
-    take.record_score("reach", "1", 0.9, {})
+    bench.labelled()
+    bench.score(1, 0.9)
     bench.do("relabel", 1, outcome="failure", reason="missed")
     assert not bench.trial(1).label.blind
     assert bench.trial(1).takes[0].blind_label.outcome == "success"

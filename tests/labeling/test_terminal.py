@@ -120,7 +120,8 @@ def test_no_prediction_before_the_label(bench: Any, serve: Any) -> None:
         await pilot.press("s")
         await until(app, lambda: "0.4321" in str(app._view["history"]))
 
-    bench.executed().record_score("reach", "1", 0.4321, {})
+    bench.executed()
+    bench.score(1, 0.4321)
     operate(serve(bench).link, steps)
 
 
