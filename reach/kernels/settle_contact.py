@@ -1,6 +1,7 @@
 """A pressed pad's preload wrench, and its friction as points on a grid of cells.
 
-As in [elements][reach.kernels.elements], but with the pressure of an elastic foundation, and with one friction point a group (a cell of the patch's box and a class of normals):
+As in [elements][reach.kernels.elements], but with the pressure of an elastic foundation, p =
+k_w delta, and with one friction point a group (a cell of the patch's box and a class of normals):
 a settling part asks for these dozens of times.
 """
 
@@ -74,26 +75,6 @@ def _add(
 
 
 @compiled
-def dragged(along: float, friction: float) -> float:
-    """Pressure on inclined surface, in parts of the column's own k_w delta.
-
-    A column is guided along the closing direction a; what it pushes with along a is k_w delta.
-    While the jaws close its tip is dragged up the slope, so that friction takes its part:
-    pressure p and friction mu p along the slope add up to k_w delta along a. Where the slope is
-    less than the friction angle the tip sticks, and pushes along a alone. Without friction this is
-    1; on surface almost parallel to a next to nothing is left of the wedge's force.
-
-    Args:
-        along: (n . a), n the inward normal.
-        friction: coefficient mu.
-    """
-    across = float(np.sqrt(max(0.0, 1.0 - along * along)))
-    if across <= friction * along:
-        return along * along
-    return along / (along + friction * across)
-
-
-@compiled
 def _cell(value: float, low: float, size: float) -> int:
     return min(CELLS - 1, max(0, int((value - low) / size)))
 
@@ -105,7 +86,6 @@ def add_layer(
     normals: FloatArray,
     high: float,
     stiffness: float,
-    friction: float,
     sums: FloatArray,
     used: IntArray,
     rows: int,
@@ -119,7 +99,6 @@ def add_layer(
         normals: inward, pad frame, shape (>= count, 3).
         high: depth at which the pressure vanishes [m].
         stiffness: of the layer [N/m^3].
-        friction: coefficient mu.
         sums: shape (GROUPS, SUMS), rows not listed in `used` are zero.
         used: rows in use, shape (GROUPS,).
         rows: how many.
@@ -161,7 +140,6 @@ def add_layer(
                 continue
         n = normals[t]
         kind = normal_class(n[0], n[1], n[2])
-        push_back = stiffness * dragged(n[2], friction)
         x0, x1, y0, y1, sx, sy = np.inf, -np.inf, np.inf, -np.inf, 0.0, 0.0
         for i in range(corners):
             x, y = whole[i, 0], whole[i, 1]
@@ -191,7 +169,7 @@ def add_layer(
                     continue
                 group = (ix * CELLS + iy) * CLASSES + kind
                 fresh = sums[group, 0] == 0.0
-                area += _add(cell, left, n, high, push_back, sums, group, wrench)
+                area += _add(cell, left, n, high, stiffness, sums, group, wrench)
                 if fresh and sums[group, 0] > 0.0:
                     used[rows] = group
                     rows += 1

@@ -119,13 +119,13 @@ def preload_of(
     stiffness = hand.stiffness * room.factors[jaw]
     depth, limit = room.depths[jaw], pads.max_deformation[jaw]
     rows, room.areas[jaw] = add_layer(
-        room.counts[jaw], one.triangles, one.normals, depth, stiffness, hand.friction,
+        room.counts[jaw], one.triangles, one.normals, depth, stiffness,
         room.sums, room.used, 0, pushed,
     )  # fmt: skip
     if depth > room.firsts[jaw] - SLACK + limit:
         rows, _ = add_layer(
             room.counts[jaw], one.triangles, one.normals, depth - limit,
-            BACKING * stiffness, hand.friction, room.sums, room.used, rows, pushed,
+            BACKING * stiffness, room.sums, room.used, rows, pushed,
         )  # fmt: skip
     total = 0.0
     room.centers[jaw] = 0.0

@@ -1,8 +1,9 @@
 """A pad as an elastic foundation pressed on a part: which surface, how deep, how much energy.
 
 The pad is a bed of independent columns along its closing direction a (a Winkler foundation). A
-column pressed in by delta pushes back along a with k_w delta per area of the pad, whatever the
-surface's slope. Beyond the pad's deformable depth a stiff backing takes over.
+column pressed in by delta pushes back along a with k_w delta per area of the pad, so that the
+pressure on a smooth surface with inward normal n is p = k_w delta, and its part along a, per area
+of surface, is k_w delta (n . a). Beyond the pad's deformable depth a stiff backing takes over.
 
 The pieces of surface over the pad's outline are found once for a pose; force and energy as
 functions of the depth are then sums of closed forms, convex in the depth.

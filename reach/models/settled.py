@@ -121,7 +121,7 @@ class SettledContact(CompiledModel):
             float(told.margin[0]),
             REASON_OF[int(told.fate[0])],
             tuple(jaw for jaw in range(missing.bit_length()) if missing >> jaw & 1),
-            lambda: settled_patches(scene, settled, depths, self.friction),
+            lambda: settled_patches(scene, settled, depths),
             settlement,
         )
 

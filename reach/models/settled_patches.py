@@ -9,23 +9,19 @@ from reach.contact import ContactPatch
 from reach.grasp import Grasp
 from reach.kernels.compiling import announced_compilation
 from reach.kernels.pads import pads_of
-from reach.kernels.settle_contact import dragged
 from reach.kernels.tree import mesh_tree
 from reach.kernels.verdict import find_patch, make_workspace
 from reach.scene import Scene
 from reach.transforms import apply
 
 
-def settled_patches(
-    scene: Scene, grasp: Grasp, depths: FloatArray, friction: float
-) -> tuple[ContactPatch, ...]:
+def settled_patches(scene: Scene, grasp: Grasp, depths: FloatArray) -> tuple[ContactPatch, ...]:
     """Describe where and how hard each pad presses.
 
     Args:
         scene: part and gripper.
         grasp: the hand in the settled part.
         depths: how deep each pad is pressed in, shape (J,) [m]; zero without contact.
-        friction: coefficient mu.
     """
     pads = pads_of(scene.gripper, grasp.opening)
     found = []
@@ -46,7 +42,6 @@ def settled_patches(
                     high,
                     depth,
                     grasp.force,
-                    friction,
                     T_object_pad,
                     scene.object.com,
                 )
@@ -61,7 +56,6 @@ def _described(
     high: float,
     depth: float,
     force: float,
-    friction: float,
     T_object_pad: FloatArray,
     com_object: FloatArray,
 ) -> ContactPatch:
@@ -70,10 +64,7 @@ def _described(
     areas = 0.5 * np.linalg.norm(np.cross(sides[:, 0], sides[:, 1]), axis=1)
     delta = high - triangles_pad[..., 2]
     per_area = delta.mean(axis=1)
-    # The columns' forces along the closing direction add up to the closing force.
     stiffness = force / float((areas * per_area) @ normals_pad[:, 2])
-    delta *= np.array([dragged(along, friction) for along in normals_pad[:, 2]])[:, None]
-    per_area = delta.mean(axis=1)
     weighted = triangles_pad.sum(axis=1) * delta.sum(axis=1, keepdims=True)
     weighted += np.einsum("mi,mij->mj", delta, triangles_pad)
     moments = areas[:, None] / 12.0 * weighted  # integral of delta r over each triangle
