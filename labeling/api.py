@@ -61,8 +61,7 @@ class ConsoleApi:
         inner.include_router(self._api_routes())
         inner.include_router(_page_routes())
         inner.include_router(self._viewer_routes())
-        source = (console.live_view.source,) if console.live_view else ()
-        self.app = Gate(inner, access, viewer_sources=source)
+        self.app = Gate(inner, access)
 
     def leave(self) -> None:
         """End all streams, so that the server can shut down at once; from its own loop."""
@@ -132,12 +131,15 @@ class ConsoleApi:
         return Response(content, media_type="image/png")
 
     def _review(self, wanted: Annotated[Filter, Query()]) -> View:
+        second = self.console.second
+        if second and wanted.tells_verdicts:
+            raise HTTPException(403, "a second operator does not filter by the first one's verdict")
         with self.console.controller.reading() as state:
             return {
                 "found_by": wanted.found_by,
-                "models": models_scored(state),
+                "models": () if second else models_scored(state),
                 "objects": sorted({t.planned.object_name for t in state.trials.values()}),
-                "trials": review_list(state, wanted, hide_labels=self.console.second),
+                "trials": review_list(state, wanted, hide_labels=second),
             }
 
     def _recording(self, trial_id: Annotated[str, Body(embed=True)]) -> dict[str, str]:

@@ -32,6 +32,11 @@ class Filter(BaseModel):
     disagrees_with: str | None = None
 
     @property
+    def tells_verdicts(self) -> bool:
+        """True if the list tells what the verdicts on its trials are."""
+        return self.outcome is not None or self.disagrees_with is not None
+
+    @property
     def found_by(self) -> str | None:
         """The name under which a verdict notes how its trial was found."""
         return DISAGREEMENT if self.disagrees_with else None

@@ -25,6 +25,10 @@ export class Review {
 
   refresh(view) {
     byId("review").hidden = false;
+    // A list of successes would show a second operator the first one's verdicts.
+    for (const choice of byId("filter").querySelectorAll("[data-tells-verdicts]")) {
+      choice.hidden = choice.control.disabled = view.second;
+    }
     if (this.version === view.version) return;
     this.version = view.version;
     this.load();

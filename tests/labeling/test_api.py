@@ -174,6 +174,25 @@ def test_the_review_filters(
     assert found["found_by"] == ("disagreement" if "disagrees_with" in wanted else None)
 
 
+def test_a_second_operator_cannot_filter_by_the_first_ones_verdicts(
+    bench: Any, serve: Any, client_of: Any
+) -> None:
+    bench.labelled("failure", reason="missed")
+    bench.score(1, 0.9)
+    client = client_of(serve(bench, mode="review", second=True))
+    for wanted in (
+        {"outcome": "success"},
+        {"outcome": "unlabelled"},
+        {"disagrees_with": "reach"},
+        {"object": "pawn", "outcome": "failure"},
+    ):
+        answer = client.get("/api/review", params=wanted)
+        assert (answer.status_code, "trials" in answer.json()) == (403, False)
+    found = client.get("/api/review", params={"object": "pawn", "margin_below": 9}).json()
+    assert [item["number"] for item in found["trials"]] == [1]
+    assert list(found["models"]) == []
+
+
 def test_an_unknown_filter_is_refused(bench: Any, serve: Any, client_of: Any) -> None:
     assert client_of(serve(bench)).get("/api/review?color=red").status_code == 422
 

@@ -321,6 +321,17 @@ def reviewing(bench: Any, serve: Any, browser: Any) -> Page:
     return page
 
 
+def test_a_second_operators_review_offers_no_filter_by_verdict(
+    bench: Any, reviewing: Page, serve: Any
+) -> None:
+    choices = "[...document.querySelectorAll('#filter select, #filter input')]"
+    offered = f"return {choices}.filter(one => one.offsetParent).map(one => one.name)"
+    assert reviewing.run(offered) == ["object", "outcome", "margin_below", "disagrees_with"]
+    second = Page(reviewing.driver, serve(bench, mode="review", second=True).link)
+    second.wait("return document.querySelectorAll('#review-list li').length === 2")
+    assert second.run(offered) == ["object", "margin_below"]
+
+
 def test_undo_in_a_review_walks_back_this_sitting_only(bench: Any, reviewing: Page) -> None:
     reviewing.press("f", "1")
     reviewing.wait("return document.getElementById('trial-number').textContent === '2'")
