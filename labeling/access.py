@@ -111,22 +111,14 @@ class Gate:
     Args:
         app: what it protects.
         access: what it demands.
-        frame_sources: origins whose pages the console may embed.
-        viewer_sources: further addresses the embedded view may read recordings from.
     """
 
-    def __init__(
-        self,
-        app: ASGIApp,
-        access: Access,
-        frame_sources: tuple[str, ...] = (),
-        viewer_sources: tuple[str, ...] = (),
-    ) -> None:
+    def __init__(self, app: ASGIApp, access: Access) -> None:
         self._app = app
         self._access = access
         self._hosts = {origin.split("//")[1] for origin in (access.origin, access.viewer_origin)}
-        self._page_policy = _page_policy((access.viewer_origin, *frame_sources))
-        self._viewer_policy = _viewer_policy(access.origin, viewer_sources)
+        self._page_policy = _page_policy(access.viewer_origin)
+        self._viewer_policy = _viewer_policy(access.origin)
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Answer a refused request here, pass the others on."""
@@ -199,17 +191,17 @@ def _limited(receive: Receive) -> Receive:
     return receive_limited
 
 
-def _page_policy(frames: tuple[str, ...]) -> str:
+def _page_policy(viewer_origin: str) -> str:
     return (
         "default-src 'self'; img-src 'self' blob: data:; style-src 'self'; script-src 'self';"
-        f" connect-src 'self'; frame-src {' '.join(frames)};"
+        f" connect-src 'self'; frame-src {viewer_origin};"
         " frame-ancestors 'none'; base-uri 'none'; form-action 'none'"
     )
 
 
-def _viewer_policy(page_origin: str, sources: tuple[str, ...]) -> str:
+def _viewer_policy(page_origin: str) -> str:
     return (
         "default-src 'self'; script-src 'self' 'wasm-unsafe-eval'; style-src 'self' 'unsafe-inline';"
-        f" connect-src 'self' data: blob: {' '.join(sources)}; worker-src blob:;"
+        " connect-src 'self' data: blob:; worker-src blob:;"
         f" img-src 'self' data: blob:; frame-ancestors {page_origin}; base-uri 'none'"
     )

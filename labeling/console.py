@@ -12,21 +12,6 @@ from labeling.controller import SessionController
 from labeling.pictures import PictureShelf
 from logs.state import TrialState
 
-
-@dataclass(frozen=True, slots=True, eq=False)
-class LiveView:
-    """A running Rerun stream for the embedded view.
-
-    Args:
-        url: what the viewer opens, such as `rerun+http://127.0.0.1:9876/proxy`; it shows the
-            blind blueprint.
-        source: the stream's HTTP origin, such as `http://127.0.0.1:9876`.
-    """
-
-    url: str
-    source: str
-
-
 Recordings = Callable[[TrialState], Path | None]
 
 
@@ -45,7 +30,6 @@ class Console:
         title: shown at the top.
         mode: `run` a session, or `review` recorded trials.
         pictures: what may be looked at.
-        live_view: the stream of the session under way, shown beside the keys.
         recordings: the blind recording (.rrd) of an executed trial, for the moment of labeling
             and for relabeling; may draw it first, takes as long as it takes.
         root: the session's folder; nothing outside it is served. None in practice.
@@ -62,7 +46,6 @@ class Console:
     title: str
     mode: Literal["run", "review"] = "run"
     pictures: PictureShelf = field(default_factory=lambda: PictureShelf(None))
-    live_view: LiveView | None = None
     recordings: Recordings = no_recording
     root: Path | None = None
     simulated: bool = False

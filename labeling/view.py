@@ -53,7 +53,6 @@ def console_view(console: Console) -> View:
             "disk_low": controller.disk_low,
             **_verdicts(console, state),
             "elapsed": (time.time_ns() - state.opened_ns) / 1e9 if state.opened_ns else None,
-            "live_view": console.live_view.url if console.live_view else None,
             "recordings": console.recordings is not no_recording,
             "second": console.second,
             "trial": _current(console, state),

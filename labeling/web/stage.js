@@ -30,8 +30,7 @@ export class Stage {
     const candidates = this.candidates(view, trial);
     const chosen = candidates.find((name) => this.ready(name));
     for (const id of ["placing", "overlay"]) byId(id).hidden = chosen !== id;
-    byId("viewer").hidden = !["live", "recording"].includes(chosen);
-    if (chosen === "live") this.point(`url=${encodeURIComponent(view.live_view)}`);
+    byId("viewer").hidden = chosen !== "recording";
     if (chosen === "recording") this.point(this.loaded.recording.came);
     byId("stage-empty").hidden = Boolean(chosen);
     byId("stage-empty").textContent = candidates.includes("recording")
@@ -40,25 +39,21 @@ export class Stage {
 
   // What may fill the stage now, the best first.
   candidates(view, trial) {
-    if (!trial) return view.live_view ? ["live"] : [];
+    if (!trial) return [];
     const pictures = trial.pictures ?? [];
     const how = pictures.some((name) => name !== OVERLAY) ? ["placing"] : [];
     const overlay = pictures.includes(OVERLAY) ? ["overlay"] : [];
-    const live = view.live_view ? ["live"] : [];
     const recording = view.recordings ? ["recording"] : [];
     if (view.mode === "review") return recording;
     switch (trial.phase) {
-      case "PLACE_OBJECT": return [...how, ...live];
-      case "REGISTER":
-      case "CONFIRM_POSE": return [...overlay, ...live, ...how];
-      case "AWAITING_LABEL": return [...live, ...recording, ...overlay, ...how];
-      default: return [...live, ...overlay, ...how];
+      case "PLACE_OBJECT": return how;
+      case "AWAITING_LABEL": return [...recording, ...overlay, ...how];
+      default: return [...overlay, ...how];
     }
   }
 
   // True if it can be shown; if it is not there yet, it is fetched, and drawn when it came.
   ready(name) {
-    if (name === "live") return true;
     const slot = this.loaded[name];
     // A picture that came stays while others of its take arrive: only the take makes it old.
     const key = `${this.trial.trial_id}/${this.trial.take}`;
