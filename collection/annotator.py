@@ -23,6 +23,7 @@ from logs.errors import LogError
 from logs.events import Entry, Scored
 from logs.mirror import AnnotationMirror
 from logs.trial_folder import VIEW_NAME
+from reach.sources import source_digest
 
 if TYPE_CHECKING:
     from collection.scoring import Prediction
@@ -169,6 +170,7 @@ def scored_event(trial_id: str, take: int, prediction: Prediction) -> Scored:
     details: dict[str, Any] = {
         "seconds": prediction.score.seconds,
         "parameters": dict(prediction.parameters),
+        "sources": source_digest(),
         **prediction.score.details,
     }
     return Scored(

@@ -36,7 +36,7 @@ class ScoredModel:
 
     Args:
         name: of the model.
-        version: of its code; a new one invalidates cached scores.
+        version: of the model, as its author counts.
         parameters: what the scores depend on.
         values: scores in [0, 1], shape (N,).
         seconds_per_grasp: median wall time of one score, measured in this run.

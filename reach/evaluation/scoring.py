@@ -15,6 +15,7 @@ from reach.evaluation.score_cache import ScoreCache, grasp_digest
 from reach.evaluation.scored import Parameter, ScoredModel, used_parameters
 from reach.grasp import Grasp
 from reach.scene import Scene
+from reach.sources import source_digest
 
 if TYPE_CHECKING:
     from reach.pose_error import PoseError
@@ -119,9 +120,11 @@ def _seconds_alone(
 
 
 def _model_key(scorer: Scorer, pose_error: PoseError | None, seed: int) -> str:
+    """Digest of all a list of scores depends on besides the grasps, the code itself included."""
     covariance = None if pose_error is None else pose_error.covariance.tobytes()
     parameters = sorted(scorer.parameters.items())
-    return cache_key(scorer.name, scorer.version, parameters, covariance, seed)
+    code = source_digest()
+    return cache_key(scorer.name, scorer.version, code, parameters, covariance, seed)
 
 
 Task = tuple[int, Scene, Grasp]

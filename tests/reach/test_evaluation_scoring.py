@@ -122,6 +122,15 @@ def test_scores_are_cached_by_content():
     assert heavier.calls == 1
 
 
+def test_scores_of_other_code_are_not_taken_from_the_cache(monkeypatch):
+    """Whatever the version says: who scored before a change must not get the old numbers after it."""
+    score_cases(cases(), CountingScorer(), pose_error=ERROR)
+    monkeypatch.setattr("reach.evaluation.scoring.source_digest", lambda: "after a change")
+    changed = CountingScorer()
+    score_cases(cases(), changed, pose_error=ERROR)
+    assert changed.calls == 12
+
+
 def test_an_interrupted_run_goes_on_where_it_stopped():
     killed = CountingScorer(fail_after=5)
     with pytest.raises(KeyboardInterrupt):
