@@ -20,7 +20,7 @@ from logs.trial_record import TrialRecord, read_record
 from reach.arrays import FloatArray
 from reach.evaluation.scored import used_parameters
 from reach.grasp import Grasp
-from reach.models.registry import Score, make_scorer
+from reach.models.registry import Score, make_scorer, warm_up
 from reach.objects import GraspObject
 from reach.pose_error import PoseError
 from reach.scene import Scene
@@ -99,6 +99,7 @@ def _bounded(covariance: FloatArray) -> FloatArray:
 
 def _predict(name: str, scene: Scene, grasp: Grasp, pose_error: PoseError, seed: int) -> Prediction:
     scorer = make_scorer(name)
+    warm_up(scorer, scene, grasp)  # or the session's first scores carry minutes of compiling
     score = scorer.score(scene, grasp, pose_error=pose_error, seed=seed)
     patches = _patches(scene, grasp) if name == PATCH_MODEL else ()
     return Prediction(

@@ -107,3 +107,16 @@ def make_scorer(name: str, **overrides: Any) -> Scorer:
     except TypeError as error:
         raise InvalidInputError(f"model {name!r} does not take {overrides!r}: {error}") from error
     return scorer
+
+
+def warm_up(scorer: Scorer, scene: Scene, grasp: Grasp) -> None:
+    """Judge a grasp once for nothing, so that the next score's time is a grasp's alone.
+
+    Compiles or loads the kernels and prepares the part. A scorer without a contact model (dynamic)
+    has none, and nothing is done.
+    """
+    from reach.models.base import ContactModel
+
+    model = getattr(scorer, "model", None)
+    if isinstance(model, ContactModel):
+        model.evaluate(scene, grasp)
