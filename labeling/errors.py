@@ -24,5 +24,9 @@ class UnsafeAddressError(InvalidInputError, LabelingError):
     """The console would listen beyond this machine without a token and TLS."""
 
 
+class ConsoleLinkError(InvalidInputError, LabelingError):
+    """A link leads to no console that would answer."""
+
+
 class OutsideSessionError(LabelingError):
     """A picture lies outside the session's folder and is not served."""

@@ -3,19 +3,85 @@
 from __future__ import annotations
 
 import json
+import ssl
 import time
 import uuid
 from collections.abc import AsyncIterator
-from typing import Any, Final
+from pathlib import Path
+from typing import Any, Final, NamedTuple
 from urllib.parse import parse_qs, urlsplit
 
 import httpx
 
-from labeling.errors import LabelingError
+from labeling.errors import ConsoleLinkError
 
 SILENCE_SECONDS: Final = 1.7
 """Three missed ticks: the connection counts as lost."""
 ANSWER_SECONDS: Final = 3.0
+
+
+class LinkParts(NamedTuple):
+    """A console's link, taken apart."""
+
+    origin: str
+    headers: dict[str, str]
+
+
+def link_parts(link: str) -> LinkParts:
+    """Take a printed link apart.
+
+    Raises:
+        ConsoleLinkError: if it is none, or holds no token.
+    """
+    parts = urlsplit(link)
+    token = parse_qs(parts.fragment).get("token", [""])[0]
+    if parts.scheme not in ("http", "https") or not parts.netloc or not token:
+        raise ConsoleLinkError(f"{link!r} is no console link; copy it whole, with #token=…")
+    return LinkParts(f"{parts.scheme}://{parts.netloc}", {"Authorization": f"Bearer {token}"})
+
+
+def trusted(certificate: Path | None) -> ssl.SSLContext | bool:
+    """Whom a connection trusts: the system's authorities, or one certificate.
+
+    Raises:
+        ConsoleLinkError: if the file holds no certificate.
+    """
+    if certificate is None:
+        return True
+    try:
+        return ssl.create_default_context(cafile=certificate)
+    except (OSError, ssl.SSLError) as error:
+        raise ConsoleLinkError(f"{certificate} is no TLS certificate (PEM): {error}") from error
+
+
+def check_link(link: str, *, verify: ssl.SSLContext | bool = True) -> None:
+    """Ask a console for one answer, so that a dead link is told before the screen is taken.
+
+    Raises:
+        ConsoleLinkError: if there is none; tells what to look at.
+    """
+    origin, headers = link_parts(link)
+    try:
+        with httpx.Client(
+            headers=headers, timeout=ANSWER_SECONDS, trust_env=False, verify=verify
+        ) as client:
+            status = client.get(f"{origin}/api/terms").status_code
+    except (httpx.HTTPError, httpx.InvalidURL) as error:
+        raise ConsoleLinkError(f"no console answers at {origin}: {_why(error)}") from error
+    if status == httpx.codes.UNAUTHORIZED:
+        raise ConsoleLinkError(
+            f"the console at {origin} does not know this token: copy the link of the session that"
+            " runs now"
+        )
+    if status != httpx.codes.OK:
+        raise ConsoleLinkError(f"what answers at {origin} is no console (HTTP status {status})")
+
+
+def _why(error: Exception) -> str:
+    text = str(error) or type(error).__name__
+    if "CERTIFICATE_VERIFY_FAILED" in text:
+        return f"its TLS certificate is not trusted; name it with --certificate ({text})"
+    return text
 
 
 class TerminalLink:
@@ -23,20 +89,17 @@ class TerminalLink:
 
     Args:
         link: the printed link, with the token in its fragment.
-        verify: path of a certificate to trust, or True for the system's.
+        verify: whom to trust, as by `trusted`.
 
     Raises:
-        LabelingError: if the link holds no token.
+        ConsoleLinkError: if the link is none, or holds no token.
     """
 
-    def __init__(self, link: str, *, verify: str | bool = True) -> None:
-        parts = urlsplit(link)
-        token = parse_qs(parts.fragment).get("token", [""])[0]
-        if not parts.scheme or not token:
-            raise LabelingError(f"{link!r} is no console link; copy it whole, with #token=…")
+    def __init__(self, link: str, *, verify: ssl.SSLContext | bool = True) -> None:
+        origin, headers = link_parts(link)
         self._client = httpx.AsyncClient(
-            base_url=f"{parts.scheme}://{parts.netloc}",
-            headers={"Authorization": f"Bearer {token}"},
+            base_url=origin,
+            headers=headers,
             timeout=ANSWER_SECONDS,
             trust_env=False,
             verify=verify,

@@ -18,8 +18,15 @@ def console(
 
     - `reach console 'http://127.0.0.1:8000/#token=...'`
     """
-    from labeling.terminal import TerminalConsole
-    from labeling.terminal_link import TerminalLink
+    from collection.errors import OptionsError
+    from collection.terminal_operator import has_terminal
+    from labeling.terminal_link import TerminalLink, check_link, trusted
 
-    verify = str(certificate) if certificate else True
+    verify = trusted(certificate)
+    check_link(link, verify=verify)
+    if not has_terminal():
+        raise OptionsError("reach console needs a terminal, and this process has none")
+
+    from labeling.terminal import TerminalConsole
+
     TerminalConsole(TerminalLink(link, verify=verify)).run()

@@ -53,6 +53,7 @@ class Bench:
 
     def __init__(self, folder: SessionFolder, *, operator: str = "ann", **options: Any) -> None:
         self.folder = folder
+        self.ann = ANN
         journal = folder.open_journal()
         self.state = SessionState.fold(folder.descriptor.trials, journal.entries)
         open_segment(journal, self.state, SETUP, operator=operator, source=Source.OPERATOR)
@@ -207,3 +208,44 @@ def client_of() -> Iterator[Callable[..., httpx.Client]]:
             return stack.enter_context(client)
 
         yield make
+
+
+@pytest.fixture
+def make_certificate() -> Callable[[Path], tuple[Path, Path]]:
+    """Write a certificate for 127.0.0.1 and its key into a folder."""
+    return _make_certificate
+
+
+def _make_certificate(folder: Path) -> tuple[Path, Path]:
+    import datetime
+    import ipaddress
+
+    from cryptography import x509
+    from cryptography.hazmat.primitives import hashes, serialization
+    from cryptography.hazmat.primitives.asymmetric import ec
+
+    key = ec.generate_private_key(ec.SECP256R1())
+    name = x509.Name([x509.NameAttribute(x509.NameOID.COMMON_NAME, "console")])
+    now = datetime.datetime.now(datetime.UTC)
+    address = x509.SubjectAlternativeName([x509.IPAddress(ipaddress.ip_address("127.0.0.1"))])
+    certificate = (
+        x509.CertificateBuilder()
+        .subject_name(name)
+        .issuer_name(name)
+        .public_key(key.public_key())
+        .serial_number(1)
+        .not_valid_before(now - datetime.timedelta(days=1))
+        .not_valid_after(now + datetime.timedelta(days=1))
+        .add_extension(address, critical=False)
+        .sign(key, hashes.SHA256())
+    )
+    paths = folder / "c.pem", folder / "k.pem"
+    paths[0].write_bytes(certificate.public_bytes(serialization.Encoding.PEM))
+    paths[1].write_bytes(
+        key.private_bytes(
+            serialization.Encoding.PEM,
+            serialization.PrivateFormat.PKCS8,
+            serialization.NoEncryption(),
+        )
+    )
+    return paths

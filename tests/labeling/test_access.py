@@ -205,7 +205,9 @@ def test_a_short_token_and_half_a_certificate_are_refused(tmp_path: Path) -> Non
         make_access("127.0.0.1", 8000, certificate=tmp_path / "c.pem")
 
 
-def test_tls_is_spoken_with_a_certificate(bench: Any, tmp_path: Path) -> None:
+def test_tls_is_spoken_with_a_certificate(
+    bench: Any, make_certificate: Any, tmp_path: Path
+) -> None:
     certificate, key = make_certificate(tmp_path)
     access = make_access("127.0.0.1", free_port(), token="x" * 20, certificate=certificate, key=key)
     console = Console(bench.controller, Actor("ann", Source.OPERATOR), "monday")
@@ -214,38 +216,3 @@ def test_tls_is_spoken_with_a_certificate(bench: Any, tmp_path: Path) -> None:
         headers = {"authorization": "Bearer " + "x" * 20}
         answer = httpx.get(f"{access.origin}/api/view", headers=headers, verify=trusted)
         assert answer.json()["title"] == "monday"
-
-
-def make_certificate(folder: Path) -> tuple[Path, Path]:
-    import datetime
-    import ipaddress
-
-    from cryptography import x509
-    from cryptography.hazmat.primitives import hashes, serialization
-    from cryptography.hazmat.primitives.asymmetric import ec
-
-    key = ec.generate_private_key(ec.SECP256R1())
-    name = x509.Name([x509.NameAttribute(x509.NameOID.COMMON_NAME, "console")])
-    now = datetime.datetime.now(datetime.UTC)
-    address = x509.SubjectAlternativeName([x509.IPAddress(ipaddress.ip_address("127.0.0.1"))])
-    certificate = (
-        x509.CertificateBuilder()
-        .subject_name(name)
-        .issuer_name(name)
-        .public_key(key.public_key())
-        .serial_number(1)
-        .not_valid_before(now - datetime.timedelta(days=1))
-        .not_valid_after(now + datetime.timedelta(days=1))
-        .add_extension(address, critical=False)
-        .sign(key, hashes.SHA256())
-    )
-    paths = folder / "c.pem", folder / "k.pem"
-    paths[0].write_bytes(certificate.public_bytes(serialization.Encoding.PEM))
-    paths[1].write_bytes(
-        key.private_bytes(
-            serialization.Encoding.PEM,
-            serialization.PrivateFormat.PKCS8,
-            serialization.NoEncryption(),
-        )
-    )
-    return paths
