@@ -128,7 +128,7 @@ def _agreement(sources: Sequence[Path]) -> OperatorAgreement | None:
     if not sessions:
         return None
     found = joint_agreement(SessionFolder.open(path).read_state() for path in sessions)
-    return OperatorAgreement(found.trials, found.agreed, found.kappa)
+    return OperatorAgreement(found.pairs, found.agreed, found.kappa)
 
 
 def write_text(path: Path, text: str) -> None:

@@ -5,20 +5,25 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import dataclass
 
-from logs.state import SessionState
+from logs.state import SessionState, TrialState
 
 
 @dataclass(frozen=True, slots=True)
 class Agreement:
-    """Agreement of the first and second operator's blind verdicts.
+    """Agreement of the first and second operators' blind verdicts.
+
+    A pair is a first operator's blind verdict on a trial and another operator's on the same one: a
+    trial that two others judged again counts as two pairs.
 
     Args:
-        trials: how many trials both judged blindly.
-        agreed: on how many they agree.
-        kappa: Cohen's kappa; None if it is undefined (no trials, or both always say the same
-            one thing).
+        pairs: how many pairs there are.
+        trials: on how many trials.
+        agreed: how many pairs agree.
+        kappa: Cohen's kappa of the pairs; None if it is undefined (no pairs, or all verdicts say
+            the same one thing).
     """
 
+    pairs: int
     trials: int
     agreed: int
     kappa: float | None
@@ -58,21 +63,20 @@ def operator_agreement(state: SessionState) -> Agreement:
 
 def joint_agreement(states: Iterable[SessionState]) -> Agreement:
     """The same over several sessions together."""
-    pairs = [pair for state in states for pair in _blind_pairs(state)]
+    trials = [pairs for state in states for t in state.trials.values() if (pairs := _pairs(t))]
+    pairs = [pair for of_trial in trials for pair in of_trial]
     agreed = sum(first == second for first, second in pairs)
-    return Agreement(len(pairs), agreed, cohen_kappa(pairs))
+    return Agreement(len(pairs), len(trials), agreed, cohen_kappa(pairs))
 
 
-def _blind_pairs(state: SessionState) -> list[tuple[str, str]]:
-    pairs: list[tuple[str, str]] = []
-    for trial in state.trials.values():
-        take = trial.valid_take
-        first = take.blind_label if take else None
-        if take is None or first is None:
-            continue
-        pairs += [
-            (first.outcome.value, second.outcome.value)
-            for second in take.second_labels.values()
-            if second.blind and second.source is first.source
-        ]
-    return pairs
+def _pairs(trial: TrialState) -> list[tuple[str, str]]:
+    """The blind pairs of one trial, one for each further operator."""
+    take = trial.valid_take
+    first = take.blind_label if take else None
+    if take is None or first is None:
+        return []
+    return [
+        (first.outcome.value, second.outcome.value)
+        for second in take.second_labels.values()
+        if second.blind and second.source is first.source
+    ]

@@ -108,4 +108,7 @@ def _print_agreement(session: Path, *, as_json: bool) -> None:
         print(json.dumps(asdict(found)))
         return
     kappa = "undefined" if found.kappa is None else f"{found.kappa:.3f}"
-    print(f"{found.agreed} of {found.trials} blind verdicts agree, Cohen's kappa {kappa}")
+    print(
+        f"{found.agreed} of {found.pairs} pairs of blind verdicts on {found.trials} trials agree,"
+        f" Cohen's kappa {kappa}"
+    )

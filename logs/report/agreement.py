@@ -10,11 +10,11 @@ class OperatorAgreement:
     """Blind verdicts of a first and a second operator on the same trials.
 
     Args:
-        trials: how many both judged blindly.
-        agreed: on how many they agree.
+        pairs: how many pairs of a first and a further operator's verdict there are.
+        agreed: how many of them agree.
         kappa: Cohen's kappa; None where chance alone would agree always.
     """
 
-    trials: int
+    pairs: int
     agreed: int
     kappa: float | None

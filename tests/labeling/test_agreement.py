@@ -12,6 +12,7 @@ from labeling.commands import Actor
 from logs.events import Source
 
 BO = Actor("bo", Source.OPERATOR)
+CY = Actor("cy", Source.OPERATOR)
 
 
 def test_kappa_matches_scikit_learn() -> None:
@@ -43,3 +44,11 @@ def test_only_blind_second_verdicts_count(bench: Any) -> None:
     bench.do("second_label", 2, by=BO, outcome="success")
     found = operator_agreement(bench.state)
     assert (found.trials, found.agreed, found.kappa) == (2, 1, 0.0)
+
+
+def test_a_trial_that_three_operators_judged_is_one_trial_and_two_pairs(bench: Any) -> None:
+    bench.labelled("success")
+    bench.do("second_label", 1, by=BO, outcome="success")
+    bench.do("second_label", 1, by=CY, outcome="failure", reason="missed")
+    found = operator_agreement(bench.state)
+    assert (found.pairs, found.trials, found.agreed) == (2, 1, 1)

@@ -96,9 +96,9 @@ def test_a_second_operator_labels_blindly_and_agreement_is_printed(bench: Any, s
         assert relabel(client, item, "second_label", outcome="success")["status"] == "stored"
     process.send_signal(signal.SIGTERM)
     printed, _ = process.communicate(timeout=10)
-    assert "1 of 2 blind verdicts agree" in printed
+    assert "1 of 2 pairs of blind verdicts on 2 trials agree" in printed
     found = json.loads(run(LABEL, str(bench.folder.path), "--agreement", "--json"))
-    assert found == {"trials": 2, "agreed": 1, "kappa": 0.0}
+    assert found == {"pairs": 2, "trials": 2, "agreed": 1, "kappa": 0.0}
 
 
 def test_a_session_under_way_is_not_relabeled(bench: Any) -> None:

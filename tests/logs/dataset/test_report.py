@@ -50,7 +50,7 @@ def result(dataset):
 def page(dataset, result):
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr("logs.report.page.PROBES", 60)
-        agreement = OperatorAgreement(trials=10, agreed=9, kappa=0.787)
+        agreement = OperatorAgreement(pairs=10, agreed=9, kappa=0.787)
         return build_report(dataset, result, ERROR, basis="made up", agreement=agreement)
 
 
