@@ -120,12 +120,14 @@ class SessionFolder:
         described = path / SESSION_NAME
         try:
             return cls(path, SessionDescriptor.model_validate_json(described.read_bytes()))
+        except (FileNotFoundError, NotADirectoryError) as error:
+            raise NotASessionError(
+                f"{path} is no session folder (no {SESSION_NAME} in it)"
+            ) from error
         except OSError as error:
-            raise NotASessionError(f"{path} is no session folder: {error}") from error
+            raise NotASessionError(f"{described} cannot be read: {error.strerror}") from error
         except ValidationError as error:
-            first = error.errors()[0]
-            where = ".".join(map(str, first["loc"])) or "content"
-            raise NotASessionError(f"{described}: {where}: {first['msg']}") from error
+            raise NotASessionError(_unreadable(described, error)) from error
 
     @property
     def journal_path(self) -> Path:
@@ -203,6 +205,17 @@ def open_segment(
     entry = journal.append(event)
     state.apply(entry)
     return entry
+
+
+def _unreadable(described: Path, error: ValidationError) -> str:
+    first = error.errors()[0]
+    where = ".".join(map(str, first["loc"]))
+    if first["type"] == "json_invalid":
+        return (
+            f"{described} is torn ({first['msg']}): restore it from a copy; it is written once, and"
+            f" what was recorded lies untouched in {TRIALS}/ and {JOURNAL_NAME}"
+        )
+    return f"{described}: {where or 'content'}: {first['msg']}"
 
 
 def _fill(folder: Path, session: SessionDescriptor, files: Mapping[str, str | bytes]) -> None:

@@ -124,8 +124,18 @@ SessionFolder.create(
 
 
 def test_a_folder_without_session_json_is_named(tmp_path: Path) -> None:
-    with pytest.raises(NotASessionError, match=str(tmp_path)):
-        SessionFolder.open(tmp_path)
+    (tmp_path / "file").touch()
+    for path in (tmp_path, tmp_path / "nothing", tmp_path / "file"):
+        with pytest.raises(NotASessionError) as refusal:
+            SessionFolder.open(path)
+        assert str(refusal.value) == f"{path} is no session folder (no session.json in it)"
+
+
+def test_a_torn_descriptor_asks_for_a_copy(folder: SessionFolder) -> None:
+    path = folder.path / SESSION_NAME
+    path.write_bytes(path.read_bytes()[:100])
+    with pytest.raises(NotASessionError, match="torn .*restore it from a copy.*trials/"):
+        SessionFolder.open(folder.path)
 
 
 def test_an_unreadable_descriptor_names_the_field(folder: SessionFolder) -> None:
