@@ -113,7 +113,7 @@ def _span(bounds: Sequence[float] | None) -> str:
 
 
 def _caption(content: Mapping[str, Any]) -> str:
-    from logs.report.footnotes import footnotes
+    from logs.report.footnotes import ORACLE, footnotes
 
     error = content["pose_error"]
     text = (
@@ -125,6 +125,7 @@ def _caption(content: Mapping[str, Any]) -> str:
         text += f" Left out of AP and AR, no trial lifted: {', '.join(without)}."
     for note, models in footnotes(content["models"], simulated=content["simulated"]).items():
         text += f" {', '.join(models)}: {note}."
+    text += f" The {ORACLE}."
     return text
 
 

@@ -10,6 +10,7 @@ from typing import Any
 from logs.dataset import Dataset
 from logs.dataset_manifest import FRAMES, UNITS
 from logs.export.columns import columns, scored_models
+from logs.report.footnotes import ORACLE, footnotes
 
 CARD_NAME = "README.md"
 _CONTENTS: Mapping[str, str] = {
@@ -82,6 +83,12 @@ def _caveats(dataset: Dataset, tops: Iterable[str]) -> list[str]:
     caveats = list(dataset.notes)
     if dataset.simulated:
         caveats.append("Simulated outcomes show what the simulation believes, not what happens.")
+    scored = scored_models(dataset.trials)
+    caveats += [
+        f"Scores of {', '.join(names)}: {note}."
+        for note, names in footnotes(scored, simulated=dataset.simulated).items()
+    ]
+    caveats.append(f"To compare models: {ORACLE}.")
     if {"graspgen", "acronym", "isaac_grasp"} & set(tops):
         caveats.append(
             "GraspGen and ACRONYM files hold one entry a planned grasp: `object_in_gripper` is the "

@@ -11,7 +11,7 @@ from logs.report import sections
 from logs.report.coverage import PlanCoverage, coverage_svg
 from logs.report.curves import precision_recall_svg, reliability_svg
 from logs.report.drift import drift_svg, measure_drift
-from logs.report.footnotes import footnotes
+from logs.report.footnotes import ORACLE, footnotes, shared_with_engine
 from logs.report.pressure import compare_pressure, pressure_svg
 from logs.report.reliability_map import ReliabilityPaint, probe_grasps, reliabilities
 from logs.report.rendering import data_uri, object_solid, render
@@ -56,6 +56,7 @@ def build_report(
     environment = Environment(undefined=StrictUndefined, autoescape=True, trim_blocks=True)
     text = resources.files("logs.report").joinpath("report.html").read_text(encoding="utf-8")
     drift = measure_drift(dataset)
+    names = [row.name for row in result.rows]
     example = _example_case(result)
     pressure = compare_pressure(example) if example else None
     return environment.from_string(text).render(
@@ -76,7 +77,9 @@ def build_report(
         coverage_picture=coverage_svg(covered) if covered else None,
         agreement=agreement,
         gains=result.gains,
-        notes=footnotes([row.name for row in result.rows], simulated=dataset.simulated),
+        notes=footnotes(names, simulated=dataset.simulated),
+        shared=shared_with_engine(names, simulated=dataset.simulated),
+        oracle=ORACLE,
         drift=drift,
         drift_picture=drift_svg(drift) if drift else None,
         error={

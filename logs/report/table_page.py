@@ -7,7 +7,7 @@ from importlib import resources
 from statistics import median
 from typing import Any
 
-from logs.report.footnotes import footnotes
+from logs.report.footnotes import ORACLE, footnotes, shared_with_engine
 from logs.report.paper import PAPER_TABLE
 
 METRICS = ("ap", "ar", "f1", "mae", "brier")
@@ -43,6 +43,8 @@ def table_page(content: Mapping[str, Any], command: str) -> str:
         metrics=METRICS,
         rows=_rows(content, notes),
         notes=list(notes),
+        oracle=ORACLE,
+        shared=shared_with_engine(content["models"], simulated=content["simulated"]),
         lifted=_lifted(content),
         held_out=_held_out_rows(content.get("cross_validation")),
         shown=[name for name in SHOWN_PER_OBJECT if name in content["models"]],

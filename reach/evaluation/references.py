@@ -1,7 +1,10 @@
 """The three rows every comparison needs, scores that use no contact model.
 
-A model that does not beat `constant` says nothing, one that does not beat `overlap` has no use
-for its physics, and none can beat `oracle`, which knows each grasp's success rate.
+A model that does not beat `constant` says nothing, and one that does not beat `overlap` has no use
+for its physics. `oracle` knows each grasp's success rate: on the same trials no score has a smaller
+MAE or Brier score. It bounds nothing else. AR grows with every score that is raised, whatever the
+labels: `constant` has 1, and F1 follows AR. AP at its rates is as good as ranks get but for grasps
+of equal rate, which it does not tell apart, and for unequal numbers of trials.
 """
 
 from __future__ import annotations

@@ -71,12 +71,14 @@ def test_every_table_is_well_formed_and_holds_the_numbers(content):
 
 def test_simulated_labels_are_marked_and_models_of_the_same_engine_named(content):
     page = table_page(content, "reach evaluate S")
-    assert "**Simulated.**" in page and "[1] its rules were compared" in page
+    assert "**Simulated.**" in page and "[1] its grade was fitted on trials of this engine" in page
+    assert "share assumptions" in page
     with_dynamic = json.loads(json.dumps(content))
     with_dynamic["models"] = {"dynamic": content["models"]["reach"], **content["models"]}
     assert "[1] same engine as the labels: a ceiling, not a rival." in table_page(with_dynamic, "x")
     physical = {**with_dynamic, "simulated": False}
     text = table_page(physical, "x")
+    assert "share assumptions" not in text
     assert "Simulated" not in text and "ceiling" not in text and "[1]" not in text
 
 
@@ -99,3 +101,11 @@ def test_the_page_names_the_data_and_the_command(content):
     assert "45 trials of 15 planned grasps on 3 objects" in page
     without = {key: value for key, value in content.items() if key != "cross_validation"}
     assert "Leave one object out" not in table_page(without, "x")
+
+
+def test_the_oracle_is_called_a_ceiling_only_of_what_it_bounds(content):
+    models = content["models"]
+    assert models["constant"]["ar"] == 1.0 > models["oracle"]["ar"]
+    for key in ("mae", "brier"):
+        assert all(row[key] >= models["oracle"][key] for row in models.values())
+    assert "bounds neither AR nor F1" in table_page(content, "x")
