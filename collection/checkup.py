@@ -18,6 +18,8 @@ LARGE_REPROJECTION = 0.5
 """A good chessboard calibration stays well below this [pixel]."""
 LARGE_POSITION_STD = 1e-3
 FEW_TRIALS = 200
+PORT_TIMEOUT = 2.0
+"""For a connection on this machine [s]."""
 
 
 class Status(StrEnum):
@@ -58,6 +60,7 @@ def examine(station: Station, folder: Path, *, capture: bool = False) -> Iterato
     yield from guarded("gripper", lambda: _gripper(station))
     yield from guarded("camera", lambda: _camera(station, capture=capture))
     yield from guarded("calibration", lambda: _calibration(station))
+    yield from _pose_error(station)
     yield from _port()
     yield from _disk(folder)
 
@@ -140,14 +143,30 @@ def _uncalibrated(station: Station) -> Check:
     return Check("calibration", Status.FAIL, detail)
 
 
+def _pose_error(station: Station) -> Iterator[Check]:
+    known = station.config.pose_error
+    detail = {
+        "stated": "as the station file states it",
+        "calibration": "the calibration's residuals; [pose_error] does not state the actuation's",
+        "unknown": "not stated: measure it and write [pose_error]; robust scores leave it out",
+    }[known.source]
+    yield passed("pose error", known.source == "stated", detail, Status.WARN)
+
+
 def _port() -> Iterator[Check]:
+    """Serve something and fetch it, as the operator's browser will."""
     try:
         with socket.create_server(("127.0.0.1", 0)) as server:
-            port = server.getsockname()[1]
+            server.settimeout(PORT_TIMEOUT)
+            place = server.getsockname()
+            with socket.create_connection(place, PORT_TIMEOUT) as page, server.accept()[0] as end:
+                end.sendall(b"page")
+                page.settimeout(PORT_TIMEOUT)
+                arrived = page.recv(4) == b"page"
     except OSError as error:
         yield Check("ports", Status.FAIL, f"the operator's page cannot be served: {error}")
         return
-    yield Check("ports", Status.OK, f"the operator's page can be served (tried port {port})")
+    yield passed("ports", arrived, f"the operator's page can be served (tried port {place[1]})")
 
 
 def _disk(folder: Path) -> Iterator[Check]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from contextlib import ExitStack
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Self
+from typing import TYPE_CHECKING, Any, Literal, Self
 
 from pydantic import BaseModel, ConfigDict, Field, InstanceOf
 
@@ -16,9 +16,10 @@ from collection.drivers import (
     BuildContext,
     find_driver,
 )
+from collection.errors import CalibrationError
 from collection.robots.motion_settings import MotionSettings
 from collection.simulation_settings import SimulationSettings
-from collection.station_file import Sections, read_sections, validated
+from collection.station_file import Sections, read_sections, validated, without_secrets
 from reach.errors import UnknownNameError
 
 if TYPE_CHECKING:
@@ -61,19 +62,22 @@ class GripperConfig(_Section):
 class PoseErrorConfig(_Section):
     """What the station knows of its own errors, beside each registration's own: measured once.
 
-    All are standard deviations of one coordinate or angle, at the workspace.
+    A real station that states none has its calibration's residuals, or nothing: no number is made
+    up for it. All are standard deviations of one coordinate or angle, at the workspace.
 
     Attributes:
         calibration_translation: of camera against robot [m].
         calibration_rotation: [rad].
         actuation_translation: of the gripper against its commanded pose [m].
         actuation_rotation: [rad].
+        source: who says so; `unknown` leaves these errors out.
     """
 
     calibration_translation: float = Field(default=8e-4, ge=0)
     calibration_rotation: float = Field(default=1e-3, ge=0)
     actuation_translation: float = Field(default=5e-4, ge=0)
     actuation_rotation: float = Field(default=2e-3, ge=0)
+    source: Literal["stated", "calibration", "unknown"] = "stated"
 
     def total(self) -> PoseError:
         """Calibration and actuation together, as an error of the object's pose."""
@@ -135,7 +139,7 @@ class Station:
 
     Args:
         config: the validated station file.
-        text: the station file as it was read, for the record.
+        text: the station file as it was read, for the record, but for its secrets.
         arm: the arm.
         gripper: the hand.
         camera: finds the object.
@@ -254,21 +258,42 @@ def load_station(name_or_path: str | Path, seed: int = 0) -> Station:
 
 def build_station(config: StationConfig, text: str, folder: Path, seed: int) -> Station:
     """Build the devices of a validated station file."""
-    clock: Clock = SimulatedClock() if config.simulation is not None else WallClock()
+    simulated = _driver(config.robot) == SIMULATED
+    clock: Clock = SimulatedClock() if simulated else WallClock()
     context = BuildContext(config, clock, seed, folder)
     robot = ROBOT_DRIVERS[_driver(config.robot)]
     camera = CAMERA_DRIVERS[_driver(config.camera)]
     arm, gripper = robot.make(config.robot, context)
     depth_camera = camera.make(config.camera, context)
+    config = config.model_copy(update={"pose_error": _known_pose_error(config, depth_camera)})
     return Station(
         config=config,
-        text=text,
+        text=without_secrets(text, config.robot, config.camera),
         arm=arm,
         gripper=gripper,
         camera=depth_camera,
         color_camera=context.shared.get("color_camera"),
         clock=clock,
         simulation=context.shared.get("simulation"),
+    )
+
+
+def _known_pose_error(config: StationConfig, camera: DepthCamera) -> PoseErrorConfig:
+    """What is known of a station's errors: as stated, else the calibration's residuals, else none."""
+    from collection.calibration import calibration_of
+
+    if "pose_error" in config.model_fields_set or config.simulation is not None:
+        return config.pose_error
+    try:
+        calibration = calibration_of(camera)
+    except CalibrationError:
+        calibration = None  # the camera says so where it matters
+    return PoseErrorConfig(
+        calibration_translation=calibration.translation_rms if calibration else 0.0,
+        calibration_rotation=calibration.rotation_rms if calibration else 0.0,
+        actuation_translation=0.0,
+        actuation_rotation=0.0,
+        source="unknown" if calibration is None else "calibration",
     )
 
 

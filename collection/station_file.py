@@ -4,16 +4,19 @@ from __future__ import annotations
 
 import re
 import tomllib
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
 
-from pydantic import BaseModel, ValidationError
+from pydantic import BaseModel, SecretStr, ValidationError
 
 from collection.errors import StationFileError
 
 _TABLE = re.compile(r"^\s*(\[\[?)\s*([\w.\-\"' ]+?)\s*\]\]?\s*(?:#.*)?$")
 _KEY = re.compile(r"^\s*([\w\-\"'.]+)\s*=")
 Place = tuple[str | int, ...]
+LEFT_OUT = "**********"
+UNREADABLE = "The station file is not kept: its password could not be left out."
 
 
 @dataclass(frozen=True, slots=True)
@@ -64,6 +67,49 @@ def validated(
         raise sections.error(where, message + more) from error
 
 
+def without_secrets(text: str, *sections: BaseModel) -> str:
+    """A station file's text as sessions keep it: what its drivers call secret is left out.
+
+    Args:
+        text: the station file.
+        sections: its validated sections, whose secrets are those that they hold as such.
+    """
+    secrets = {
+        name: value.get_secret_value()
+        for section in sections
+        for name, value in ((n, getattr(section, n)) for n in type(section).model_fields)
+        if isinstance(value, SecretStr)
+    }
+    for name, value in secrets.items():
+        line = re.compile(rf"^(\s*(?:[\w\-]+\.)?[\"']?{name}[\"']?\s*=).*$", re.MULTILINE)
+        text = line.sub(rf'\1 "{LEFT_OUT}"', text)
+        if value:
+            text = text.replace(value, LEFT_OUT)
+    return text if _still_leaves_out(text, secrets) else f"# {UNREADABLE}\n"
+
+
+def _still_leaves_out(text: str, secrets: dict[str, str]) -> bool:
+    """Whether no value of the file is a secret, however it was written."""
+    if not secrets:
+        return True
+    try:
+        values = [*_strings(tomllib.loads(text))]
+    except tomllib.TOMLDecodeError:
+        return False
+    return not any(secret and secret in value for secret in secrets.values() for value in values)
+
+
+def _strings(value: Any) -> Iterator[str]:
+    if isinstance(value, dict):
+        for each in value.values():
+            yield from _strings(each)
+    elif isinstance(value, list):
+        for each in value:
+            yield from _strings(each)
+    elif isinstance(value, str):
+        yield value
+
+
 def _message(model: type[BaseModel], error: dict[str, Any], where: Place, place: Place) -> str:
     name = ".".join(str(part) for part in where)
     holder = _model_at(model, where[len(place) : -1])
@@ -72,6 +118,9 @@ def _message(model: type[BaseModel], error: dict[str, Any], where: Place, place:
         return f"unknown key {name!r}; valid keys: {keys}"
     if error["type"] == "missing":
         return f"missing key {name!r}; valid keys: {keys}"
+    field = holder.model_fields.get(str(where[-1])) if holder else None
+    if field is not None and field.annotation is SecretStr:
+        return f"{name}: {error['msg']}"
     return f"{name}: {error['msg']}, got {error['input']!r}"
 
 

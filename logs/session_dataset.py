@@ -236,27 +236,38 @@ def _table_height(folder: SessionFolder) -> float:
     return _station_section(folder, "workspace").get("table_height", 0.0)
 
 
-def _station_error(folder: SessionFolder) -> tuple[float, float] | None:
-    """Variances of translation [m^2] and rotation [rad^2] that the station file states.
+def _station_error(folder: SessionFolder) -> tuple[float, float, str] | None:
+    """Variances of translation [m^2] and rotation [rad^2] that are known of a station, and whence.
 
     Its section `pose_error` holds standard deviations named by cause: calibration, actuation.
     """
     numbers = _station_section(folder, "pose_error")
-    if not numbers:
+    source = _pose_error_source(folder)
+    if not numbers or source == "unknown":
         return None
     translation = sum(v * v for key, v in numbers.items() if key.endswith("_translation"))
     rotation = sum(v * v for key, v in numbers.items() if key.endswith("_rotation"))
-    return translation, rotation
+    whence = "calibration and actuation as the station file states them"
+    if source == "calibration":
+        whence = "the calibration's residuals (actuation is not stated)"
+    return translation, rotation, whence
+
+
+def _pose_error_source(folder: SessionFolder) -> str:
+    """Who says how large the station's errors are; sessions before this was kept: the file."""
+    station = folder.descriptor.config.get("station")
+    section = station.get("pose_error") if isinstance(station, dict) else None
+    return str(section.get("source", "stated")) if isinstance(section, dict) else "unknown"
 
 
 def _pose_error(
-    trials: Iterable[LabeledTrial], station: tuple[float, float] | None
+    trials: Iterable[LabeledTrial], station: tuple[float, float, str] | None
 ) -> StatedPoseError | None:
     """Root mean square of the registrations' own deviations, and the station's beside them.
 
     Args:
         trials: those that count.
-        station: stated variances of calibration and actuation together.
+        station: variances of calibration and actuation together, and whence; None if not stated.
     """
     covariances = [t.execution.covariance for t in trials if t.execution.covariance is not None]
     if not covariances:
@@ -269,9 +280,9 @@ def _pose_error(
     basis = f"root mean square of {len(covariances)} registrations' stated covariances"
     if station is not None:
         translation, rotation = translation + station[0], rotation + station[1]
-        basis += ", and calibration and actuation as the station file states them"
+        basis += f", and {station[2]}"
     else:
-        basis += "; calibration and actuation not included"
+        basis += "; calibration and actuation not stated, and not included"
     return StatedPoseError(_stated(translation), _stated(rotation), basis)
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import socket
 import tomllib
 from pathlib import Path
 
@@ -24,7 +25,7 @@ def test_the_simulated_station_is_well(tmp_path: Path, capsys: pytest.CaptureFix
     assert main(arguments) == 0
     found = checks(capsys)
     looked_at = {"arm", "gripper", "gripper calibration", "camera", "image", "calibration"}
-    assert looked_at | {"ports", "disk"} == set(found)
+    assert looked_at | {"pose error", "ports", "disk"} == set(found)
     assert "fail" not in {check["status"] for check in found.values()}
     assert "trials" in found["disk"]["detail"]
 
@@ -32,8 +33,19 @@ def test_the_simulated_station_is_well(tmp_path: Path, capsys: pytest.CaptureFix
 def test_the_table_has_one_line_a_check(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["doctor"]) == 0
     lines = capsys.readouterr().out.splitlines()
-    assert len(lines) == 7
+    assert len(lines) == 8
     assert all(line.split()[0] in {"OK", "WARN"} for line in lines)
+
+
+def test_a_page_that_cannot_be_reached_is_a_failed_check(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def refused(*_: object) -> socket.socket:
+        raise ConnectionRefusedError(111, "Connection refused")
+
+    monkeypatch.setattr(socket, "create_connection", refused)
+    assert main(["doctor", "--json"]) == 1
+    assert checks(capsys)["ports"]["status"] == "fail"
 
 
 @pytest.mark.parametrize("station", ["simulated", "yumi"])

@@ -2,9 +2,18 @@
 
 from __future__ import annotations
 
+import os
 from typing import Literal
 
-from pydantic import BaseModel, ConfigDict, Field, PositiveFloat
+from pydantic import BaseModel, ConfigDict, Field, PositiveFloat, SecretStr
+
+PASSWORD_VARIABLE = "REACH_YUMI_PASSWORD"
+DELIVERED = "robotics"
+"""The password that every IRC5 is delivered with, as its manual prints it."""
+
+
+def _password() -> SecretStr:
+    return SecretStr(os.environ.get(PASSWORD_VARIABLE, DELIVERED))
 
 
 class YumiConfig(BaseModel):
@@ -18,7 +27,10 @@ class YumiConfig(BaseModel):
     driver: Literal["yumi"]
     address: str = Field("192.168.125.1", description="host, or host:port, of the controller")
     user: str = Field("Default User", description="of the controller's user management")
-    password: str = Field("robotics", description="of that user", repr=False)
+    password: SecretStr = Field(
+        default_factory=_password,
+        description=f"of that user; without it the environment variable {PASSWORD_VARIABLE}",
+    )
     side: Literal["right", "left"] = Field("right", description="arm that carries the gripper")
     base: tuple[float, float, float] = Field(
         (0.0, 0.0, 0.0), description="x, y, z of the robot's base in the world"

@@ -222,7 +222,9 @@ class ControllerLink:
 
     def _session(self) -> WebServices:
         config = self.config
-        return WebServices(config.url, config.user, config.password, config.request_timeout)
+        return WebServices(
+            config.url, config.user, config.password.get_secret_value(), config.request_timeout
+        )
 
 
 def module_text() -> str:
