@@ -56,6 +56,10 @@ class SimulatedClock:
         for follower in self._followers:
             follower(seconds)
 
+    def begin_at(self, time_ns: int) -> None:
+        """Set the time [ns], before anything happens; it never goes back, and no world follows."""
+        self._now_ns = max(self._now_ns, time_ns)
+
     def follow(self, advance: Callable[[float], None]) -> None:
         """Call `advance(seconds)` whenever time passes."""
         self._followers.append(advance)

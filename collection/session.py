@@ -11,6 +11,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+from collection.clock import SimulatedClock
 from collection.errors import (
     CollectionError,
     DeviceError,
@@ -18,6 +19,7 @@ from collection.errors import (
     Recovery,
     StoppedError,
 )
+from collection.recorded_time import last_recorded_ns
 from collection.trial import TrialContext, run_take
 from labeling.auto import ACTOR
 from labeling.commands import AnswerStatus, Command, CommandKind
@@ -66,6 +68,7 @@ class Session:
         """
         voids: Counter[str] = Counter()
         self.controller.releases_with(self.context.station.arm.release_stop)
+        self._begin_time()
         while (work := self.controller.next_work()) is not None:
             if work.valid_take is None and not self._station_is_ready():
                 continue
@@ -81,6 +84,12 @@ class Session:
             except (RegistrationError, PlacementError, DeviceError) as error:
                 voids[work.trial_id] += 1
                 self._void(work, take, error, voids[work.trial_id])
+
+    def _begin_time(self) -> None:
+        """A simulated clock begins with the session, and later where the last record ended."""
+        clock = self.context.station.clock
+        if isinstance(clock, SimulatedClock):
+            clock.begin_at(last_recorded_ns(self.context.session_path))
 
     def annotate_earlier(self) -> None:
         """Annotate what an earlier process labelled and did not live to annotate."""

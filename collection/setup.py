@@ -42,12 +42,14 @@ class Setup:
         station_text: the station file as it was read.
         objects: by name, in the plan's order.
         plan: of the session.
+        simulated: whether the session that this was read from is.
     """
 
     options: SessionOptions
     station_text: str
     objects: Mapping[str, GraspObject]
     plan: Plan
+    simulated: bool = False
 
     def descriptor(self, station: Station) -> SessionDescriptor:
         """What session.json will say."""
@@ -122,7 +124,8 @@ def read_setup(folder: SessionFolder) -> Setup:
         vertices, faces = read_mesh((folder.path / OBJECTS / f"{part.name}.ply").read_bytes())
         objects[part.name] = GraspObject(part.name, vertices, faces, part.mass)
     options = SessionOptions.model_validate(config["options"])
-    return Setup(options, str(config["station_file"]), objects, plan)
+    simulated = folder.descriptor.simulated
+    return Setup(options, str(config["station_file"]), objects, plan, simulated)
 
 
 def resolved_station(station: Station) -> dict[str, Any]:
@@ -171,7 +174,7 @@ def same_station(station: Station, setup: Setup, path: Path) -> None:
     Raises:
         StationFileError: a simulated session on a real station, or the other way round.
     """
-    was_simulated = "[simulation]" in setup.station_text
+    was_simulated = setup.simulated
     if was_simulated != (station.simulation is not None):
         kinds = {True: "simulated", False: "real"}
         raise StationFileError(
