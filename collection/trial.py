@@ -18,9 +18,10 @@ import numpy as np
 
 from collection import record_mapping as mapping
 from collection.errors import PlacementError, UnreachableError, UnsafeMotionError
+from collection.placement import well_placed
 from collection.robots.execution import Execution
 from collection.robots.half_turn import held_alike
-from collection.robots.motion import can_execute, execute_grasp
+from collection.robots.motion import execute_grasp
 from collection.trial_watch import TrialWatch
 from collection.truth import registration_error, true_outcome
 from logs.descriptions import STATION_FILE, gripper_attachment, robot_attachment
@@ -158,8 +159,7 @@ def _place(attempt: _Attempt) -> None:
         return
 
     def accept(T_world_object: FloatArray) -> bool:
-        grasps = attempt.grasps_held_alike(T_world_object)
-        return can_execute(attempt.station.arm, grasps, attempt.station.config.motion)
+        return well_placed(attempt.station, attempt.grasps_held_alike, T_world_object)
 
     rng = np.random.default_rng(attempt.seed)
     simulation.place(attempt.obj, attempt.pose, rng, accept=accept)
