@@ -66,4 +66,4 @@ def quantities(gripper: ParallelJawGripper, told: Settled) -> FloatArray:
     return np.array([1.0, log_odds, inside.mean()])
 
 
-GRADE = Grade(offset=-1.39, share=0.76, inside=4.99)
+GRADE = Grade(offset=-0.73, share=0.83, inside=3.76)
