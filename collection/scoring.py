@@ -6,6 +6,7 @@ pose with its uncertainty, and the planned grasp. It never sees what came of it.
 
 from __future__ import annotations
 
+import tomllib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -13,7 +14,7 @@ from pathlib import Path
 import numpy as np
 
 from logs.annotations import PatchRecord
-from logs.descriptions import GRIPPER_DESCRIPTION, read_gripper
+from logs.descriptions import GRIPPER_DESCRIPTION, STATION_FILE, read_gripper
 from logs.errors import RecordReadError
 from logs.mesh_attachment import OBJECT_MESH, read_mesh
 from logs.trial_record import TrialRecord, read_record
@@ -78,7 +79,24 @@ def scene_of(record: TrialRecord) -> Scene:
         described.object_name, vertices, faces, described.object_mass, described.center_of_mass
     )
     gripper = read_gripper(record.attachments[GRIPPER_DESCRIPTION].data)
-    return Scene(part, gripper, record.registration.T_world_object)
+    return Scene(part, gripper, record.registration.T_world_object, table_height(record))
+
+
+def table_height(record: TrialRecord) -> float:
+    """World z of the table [m], from the station file in the record; zero where it says nothing.
+
+    Raises:
+        RecordReadError: the station file in the record cannot be read.
+    """
+    attached = record.attachments.get(STATION_FILE)
+    if attached is None:
+        return 0.0
+    try:
+        return float(tomllib.loads(attached.data.decode())["workspace"]["table_height"])
+    except KeyError:
+        return 0.0
+    except (ValueError, TypeError) as error:
+        raise RecordReadError(f"{record.path}: {STATION_FILE} in it: {error}") from error
 
 
 def registration_error(record: TrialRecord) -> PoseError:
