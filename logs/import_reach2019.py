@@ -50,7 +50,10 @@ PUBLISHED_GRAMS: Mapping[str, float] = {
 """Masses of the printed objects of the published experiment [g]."""
 
 STATED_POSE_ERROR = StatedPoseError(
-    1e-3, 3e-3, "the pose noise that the same laboratory's later work assumes, not measured here"
+    1e-3,
+    3e-3,
+    "the pose noise that the same laboratory's later work assumes, not measured here; also the "
+    "models' default, judged on the published trials, which are development data",
 )
 
 PUBLISHED_RULE = (
@@ -102,23 +105,24 @@ def read_masses(path: Path) -> dict[str, float]:
 
 
 def import_reach2019(
-    grasps: Path, meshes: Path, rule: MassRule, *, ignore: Sequence[Path] = ()
+    grasps: Path, meshes: Path, rule: MassRule, *, ignore: Sequence[Path] = (), unit: str = "m"
 ) -> Dataset:
     """Read published files into a data set.
 
     Args:
         grasps: a file, or a folder that is searched for .json files.
-        meshes: folder with a mesh per object, named like it.
+        meshes: folder with a mesh per object, named like it; folders in it are not searched.
         rule: masses.
         ignore: files in the folder that are not grasps, such as the masses.
+        unit: of the meshes: m, cm, mm or in.
 
     Raises:
         DatasetError: no file, a record that does not fit, or a missing mesh.
-        InvalidMeshError: a mesh that is no closed surface in meters.
+        InvalidMeshError: a mesh that is no closed surface, or of no such size in this unit.
     """
     records = [record for path in _grasp_files(grasps, ignore) for record in read_records(path)]
     _refuse_repeats(records)
-    objects, sources = _load_objects(sorted({r.record.obj for r in records}), meshes, rule)
+    objects, sources = _load_objects(sorted({r.record.obj for r in records}), meshes, rule, unit)
     trials, split = _trials(records, objects)
     return Dataset(
         name=grasps.stem,
@@ -160,11 +164,11 @@ def _refuse_repeats(records: Sequence[ReadRecord]) -> None:
 
 
 def _load_objects(
-    names: Sequence[str], meshes: Path, rule: MassRule
+    names: Sequence[str], meshes: Path, rule: MassRule, unit: str
 ) -> tuple[dict[str, GraspObject], dict[str, str]]:
     if not meshes.is_dir():
         raise DatasetError(f"no folder of meshes at {meshes}")
-    found = {path.stem: path for path in sorted(meshes.rglob("*"), key=_mesh_preference)}
+    found = {path.stem: path for path in sorted(meshes.iterdir(), key=_mesh_preference)}
     objects, sources = {}, {}
     for name in names:
         path = found.get(name) or found.get(safe_name(name))  # as exports name their files
@@ -174,7 +178,13 @@ def _load_objects(
         mass, sources[name] = rule.mass(name)
         # Published trials cannot be run again with a better mesh: mend theirs, and tell.
         objects[name] = GraspObject.load(
-            path, mass=mass, density=rule.density, infill=rule.infill, name=name, repair=True
+            path,
+            unit=unit,
+            mass=mass,
+            density=rule.density,
+            infill=rule.infill,
+            name=name,
+            repair=True,
         )
     return objects, sources
 

@@ -14,7 +14,12 @@ IMPORT_FORMATS = ("reach2019",)
 def import_(
     format_name: Annotated[str, typer.Argument(metavar="FORMAT", help="reach2019")],
     grasps: Annotated[Path, typer.Option(help="A JSON file, or a folder of them.")],
-    meshes: Annotated[Path, typer.Option(help="Folder of meshes named like the objects.")],
+    meshes: Annotated[
+        Path,
+        typer.Option(
+            help="Folder of meshes named like the objects; folders in it are not searched."
+        ),
+    ],
     out: Annotated[Path, typer.Option(help="New folder for the data set.")],
     masses: Annotated[
         Path | None,
@@ -24,6 +29,7 @@ def import_(
         float, typer.Option(help="Of the material, if no mass is known [kg/m3].")
     ] = (1240.0),
     infill: Annotated[float, typer.Option(help="Printed share of the volume, 0 to 1.")] = 0.2,
+    mesh_unit: Annotated[str, typer.Option(help="Unit of the mesh files: m, cm, mm or in.")] = "m",
     as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object.")] = False,
 ) -> None:
     """Read published physical trials into a data set that every other command takes.
@@ -46,7 +52,8 @@ def import_(
         raise InvalidInputError(f"--infill is {infill}, expected above 0 and at most 1")
     grams = read_masses(masses) if masses else {}
     rule = MassRule(grams, positive(density, "--density [kg/m3]"), infill)
-    dataset = import_reach2019(grasps, meshes, rule, ignore=[masses] if masses else [])
+    ignore = [masses] if masses else []
+    dataset = import_reach2019(grasps, meshes, rule, ignore=ignore, unit=mesh_unit)
     write_dataset(dataset, out, ("parquet", "csv"))
     rows = [
         {

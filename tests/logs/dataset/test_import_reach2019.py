@@ -243,3 +243,16 @@ def test_published_trials(published, tmp_path):
     write_dataset(dataset, tmp_path / "d", ("parquet", "reach2019"))
     original = (published / "reach2019" / "cube_3cm.json").read_bytes()
     assert (tmp_path / "d" / "reach2019" / "cube_3cm.json").read_bytes() == original
+
+
+def test_meshes_in_millimeters_are_read_and_folders_below_are_not_searched(files):
+    grasps, meshes = files([record()])
+    trimesh.creation.box((18, 18, 18)).export(meshes / "block.stl")
+    with pytest.raises(InvalidMeshError, match="--mesh-unit mm"):
+        import_reach2019(grasps, meshes, MassRule({}))
+    read_in_mm = import_reach2019(grasps, meshes, MassRule({}), unit="mm").objects["block"]
+    assert np.ptp(read_in_mm.vertices, axis=0) == pytest.approx([0.018] * 3)
+    (meshes / "below").mkdir()
+    (meshes / "block.stl").rename(meshes / "below" / "block.stl")
+    with pytest.raises(UnknownNameError, match="no mesh in"):
+        import_reach2019(grasps, meshes, MassRule({}), unit="mm")
