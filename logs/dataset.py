@@ -148,7 +148,7 @@ def merge(datasets: Sequence[Dataset]) -> Dataset:
         for name, part in one.objects.items():
             known = objects.setdefault(name, part)
             if known.content_hash != part.content_hash or known.mass != part.mass:
-                raise DatasetError(f"object {name!r} of {one.name!r} has another shape or mass")
+                raise DatasetError(_two_of_one_name(known, part, one.name))
     return replace(
         first,
         name="+".join(dict.fromkeys(one.name for one in datasets)),
@@ -162,6 +162,24 @@ def merge(datasets: Sequence[Dataset]) -> Dataset:
         notes=tuple(dict.fromkeys(note for one in datasets for note in one.notes)),
         success_rule=" ".join(dict.fromkeys(one.success_rule for one in datasets)),
     )
+
+
+def _two_of_one_name(known: GraspObject, part: GraspObject, source: str) -> str:
+    differs = f"mass {part.mass * 1e3:.4g} g instead of {known.mass * 1e3:.4g} g"
+    if known.content_hash != part.content_hash:
+        differs = f"another shape, {_sizes(part)} instead of {_sizes(known)}, or another {differs}"
+        if known.mass == part.mass:
+            differs = f"another shape, {_sizes(part)} instead of {_sizes(known)}"
+    return (
+        f"object {part.name!r} of {source!r} has {differs}: evaluate the sets apart, or import or "
+        "record it under a name of its own"
+    )
+
+
+def _sizes(part: GraspObject) -> str:
+    extents = (part.vertices.max(axis=0) - part.vertices.min(axis=0)) * 1e3
+    size = " x ".join(f"{extent:.4g}" for extent in extents)
+    return f"{size} mm of {len(part.faces)} faces"
 
 
 def _joint_pose_error(datasets: Sequence[Dataset]) -> StatedPoseError | None:

@@ -126,8 +126,9 @@ BASE_COLUMNS: tuple[Column, ...] = (
     Column(
         "registration_covariance",
         "numbers",
-        "of the registered pose, 6x6 row-major, (rotation, translation), object frame; infinite in "
-        "a direction that the image does not tell",
+        "of the registered pose, 6x6 row-major, (rotation, translation), object frame, as "
+        "registration states it in the camera's frame: without the calibration and hand errors, "
+        "which shift all trials of a station alike",
         lambda t: _flat(t.execution.covariance),
         "rad, m",
         nullable=True,

@@ -15,7 +15,7 @@ def graspgen_files(
     meshes: Mapping[str, str],
     stems: Mapping[str, str],
 ) -> dict[str, bytes]:
-    """Files by path.
+    """Files by path; each names its object's mesh relative to itself.
 
     Args:
         dataset: what is written.
@@ -26,7 +26,7 @@ def graspgen_files(
     files = {}
     for name, rows in grasps.items():
         content = {
-            "object": {"file": meshes[name], "scale": 1.0},
+            "object": {"file": f"../{meshes[name]}", "scale": 1.0},
             "grasps": {
                 "transforms": [row.T_object_gripper.tolist() for row in rows],
                 "object_in_gripper": [row.majority for row in rows],

@@ -32,7 +32,7 @@ def isaac_files(
         head = (
             f"# {marked} trials of {name} with the {dataset.gripper.name} hand; confidence = share "
             "of trials stably lifted.\n# Meters; cspace positions are each jaw's distance from "
-            "closed; gripper z toward the finger tips, jaws close along x.\n"
+            "closed, left out where no width is known; gripper z toward the finger tips, jaws close along x.\n"
         )
         text = yaml.dump(content, Dumper=dumper, sort_keys=False, default_flow_style=None)
         files[f"isaac_grasp/{stems[name]}.yaml"] = (head + text).encode()
@@ -41,12 +41,13 @@ def isaac_files(
 
 def _grasp(row: GraspSummary, gripper: ParallelJawGripper) -> dict[str, Any]:
     w, x, y, z = quat_wxyz_from_rotation(row.T_object_gripper[:3, :3]).tolist()
-    closed = 0.5 * (row.width or 0.0)
+    # Never zero for "not known": that would say that the jaws met.
+    closed = {} if row.width is None else {"cspace_position": _jaws(gripper, 0.5 * row.width)}
     return {
         "confidence": row.rate,
         "position": row.T_object_gripper[:3, 3].tolist(),
         "orientation": {"w": w, "xyz": [x, y, z]},
-        "cspace_position": _jaws(gripper, closed),
+        **closed,
         "pregrasp_cspace_position": _jaws(gripper, gripper.stroke),
     }
 

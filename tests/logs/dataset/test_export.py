@@ -21,6 +21,8 @@ from logs.dataset import merge
 from logs.dataset_files import FORMATS, read_dataset, read_manifest, write_dataset
 from logs.dataset_sources import load_labeled
 from logs.errors import DatasetError
+from logs.export.grasps import GraspSummary
+from logs.export.isaac_grasp import isaac_files
 from reach.errors import UnknownNameError
 from reach.transforms import rotation_from_quat_wxyz
 
@@ -129,7 +131,7 @@ def test_meshes_open_in_trimesh(written):
 def test_graspgen_json(written):
     dataset, folder = written
     content = json.loads((folder / "graspgen" / "part_1.json").read_text())
-    assert (folder / content["object"]["file"]).is_file()
+    assert (folder / "graspgen" / content["object"]["file"]).is_file()
     assert content["object"]["scale"] == 1.0
     transforms = np.array(content["grasps"]["transforms"])
     labels = content["grasps"]["object_in_gripper"]
@@ -156,6 +158,13 @@ def test_isaac_yaml(written):
         assert 0 <= grasp["confidence"] <= 1
         closed, opened = grasp["cspace_position"], grasp["pregrasp_cspace_position"]
         assert set(closed) == {"jaw_0", "jaw_1"} and closed["jaw_0"] <= opened["jaw_0"] == 0.025
+
+
+def test_isaac_leaves_out_a_width_that_nobody_knows(make_dataset):
+    row = GraspSummary("g", np.eye(4), 0, 2, None, simulated=True)
+    files = isaac_files(make_dataset(objects=1), {"a": [row]}, {"a": "a"})
+    grasp = yaml.safe_load(files["isaac_grasp/a.yaml"])["grasps"]["grasp_0"]
+    assert "cspace_position" not in grasp and "pregrasp_cspace_position" in grasp
 
 
 def test_acronym_hdf5(written):
@@ -276,7 +285,9 @@ def test_merging_keeps_equal_grasps_and_parts_different_ones(make_dataset):
     with pytest.raises(DatasetError, match="trial id twice"):
         merge([monday, monday])
     heavier = make_dataset(objects=2, faces=100)
-    with pytest.raises(DatasetError, match="another shape or mass"):
+    with pytest.raises(
+        DatasetError, match=r"another shape, .* mm of .* instead of .* name of its own"
+    ):
         merge([monday, _with_trials(heavier, rename)])
 
 
