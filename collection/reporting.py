@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import math
 import os
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING
 
 from reach.errors import InvalidInputError
@@ -129,6 +130,26 @@ def _agreement(sources: Sequence[Path]) -> OperatorAgreement | None:
         return None
     found = joint_agreement(SessionFolder.open(path).read_state() for path in sessions)
     return OperatorAgreement(found.pairs, found.agreed, found.kappa)
+
+
+def check_targets(paths: Iterable[Path | None]) -> None:
+    """Refuse, before any work, files that could not be written after it.
+
+    Args:
+        paths: files; None for one that was not asked for.
+
+    Raises:
+        InvalidInputError: if one is a folder, or its folder can neither be written to nor made.
+    """
+    for path in (path for path in paths if path is not None):
+        try:
+            if path.is_dir():
+                raise IsADirectoryError(f"{path} is a folder")
+            folder = next(one for one in path.absolute().parents if one.exists())
+            with TemporaryDirectory(prefix=".writing-", dir=folder):
+                pass
+        except OSError as error:
+            raise InvalidInputError(f"cannot write {path}: {error}") from error
 
 
 def write_text(path: Path, text: str) -> None:

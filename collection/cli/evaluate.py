@@ -30,7 +30,9 @@ def evaluate(
     cross_validate: Annotated[
         bool, typer.Option(help="Also the paper's protocol: leave one object out.")
     ] = False,
-    draws: Annotated[int, typer.Option(help="Parameter draws of the cross-validation.")] = 100,
+    draws: Annotated[
+        int, typer.Option(min=1, help="Parameter draws of the cross-validation.")
+    ] = 100,
     markdown: Annotated[
         Path | None, typer.Option(help="Write the table as a page, beside the paper's figures.")
     ] = None,
@@ -60,13 +62,18 @@ def evaluate(
     """
     from collection.cli.evaluation_table import evaluation_table, print_table, progress_bars
     from collection.evaluating import chosen_pose_error, evaluation_content, model_names
-    from collection.reporting import write_text
+    from collection.reporting import check_targets, write_text
     from logs.dataset_sources import load_labeled
+    from reach.errors import InvalidInputError
     from reach.evaluation.backends import cluster
     from reach.evaluation.compare import compare, scorers_of
     from reach.evaluation.protocol import run_protocol
     from reach.models.registry import make_scorer
 
+    if jobs != -1 and jobs < 1:
+        raise InvalidInputError(f"--jobs is {jobs}, expected 1 or more, or -1 for all cores")
+    printed = as_json is not None and str(as_json) == "-"
+    check_targets([None if printed else as_json, markdown, plots and plots / "reliability.svg"])
     dataset = load_labeled(sources, unblinded=unblinded)
     error, basis = chosen_pose_error(dataset, pose_error)
     scorers = scorers_of(model_names(models))
@@ -97,7 +104,7 @@ def evaluate(
             )
     content = evaluation_content(dataset, result, basis, protocol)
     if plots is not None:
-        _write_plots(result, plots)
+        _write_plots(result, plots, simulated=dataset.simulated)
     if markdown is not None:
         from logs.report.table_page import table_page
 
@@ -112,7 +119,7 @@ def evaluate(
             markdown=markdown.name,
         )
         write_text(markdown, table_page(content, command))
-    if as_json is not None and str(as_json) == "-":
+    if printed:
         print(json.dumps(content))
         return
     if as_json is not None:
@@ -130,10 +137,11 @@ def _command(sources: list[Path], **chosen: object) -> str:
     return " ".join(["reach evaluate", *(path.name or "." for path in sources), *options])
 
 
-def _write_plots(result: Evaluation, folder: Path) -> None:
+def _write_plots(result: Evaluation, folder: Path, *, simulated: bool) -> None:
     from collection.reporting import write_text
-    from logs.report.curves import precision_recall_svg, reliability_svg
+    from logs.report.curves import SIMULATED, precision_recall_svg, reliability_svg
 
     folder.mkdir(parents=True, exist_ok=True)
-    write_text(folder / "precision_recall.svg", precision_recall_svg(result))
-    write_text(folder / "reliability.svg", reliability_svg(result))
+    mark = SIMULATED if simulated else ""
+    write_text(folder / "precision_recall.svg", precision_recall_svg(result, mark=mark))
+    write_text(folder / "reliability.svg", reliability_svg(result, mark=mark))

@@ -18,7 +18,7 @@ UNITS = {"friction": "", "compliance": " m/N", "stiffness": " N/m^3", "translati
 def fit(
     sources: Annotated[list[Path], typer.Argument(help="Session or data-set folders.")],
     model: Annotated[str, typer.Option(help="A robust model.")] = "reach-robust",
-    samples: Annotated[int, typer.Option(help="Perturbations a score.")] = 50,
+    samples: Annotated[int, typer.Option(min=1, help="Perturbations a score.")] = 50,
     seed: Annotated[int, typer.Option(help="Of the perturbations.")] = 0,
     backend: Annotated[
         str, typer.Option(help="Where scores are computed: serial, threading or loky.")
@@ -56,7 +56,8 @@ def fit(
     if as_json:
         print(json.dumps(_content(found, scatter, model, dataset.simulated)))
         return
-    print("\n".join([*_likelihood_lines(found, model), *_registration_lines(scatter)]))
+    marked = ["simulated labels: this is the simulation's station, no robot's"] * dataset.simulated
+    print("\n".join([*marked, *_likelihood_lines(found, model), *_registration_lines(scatter)]))
 
 
 def _content(

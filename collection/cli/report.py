@@ -41,9 +41,10 @@ def report(
     """
     from collection.cli.evaluation_table import progress_bars
     from collection.evaluating import model_names
-    from collection.reporting import write_report
+    from collection.reporting import check_targets, write_report
 
     page = out or (sources[0] / "report.html" if len(sources) == 1 else Path("report.html"))
+    check_targets([page])
     with progress_bars() as progress:
         result = write_report(
             sources,

@@ -24,8 +24,12 @@ def pooled(result: Evaluation) -> ObjectOutcomes:
     )
 
 
-def precision_recall_svg(result: Evaluation, name: str = "pr") -> str:
-    """Precision against recall of every row, over all trials pooled."""
+SIMULATED = "simulated labels"
+"""What stands on a picture that is a file of its own."""
+
+
+def precision_recall_svg(result: Evaluation, name: str = "pr", *, mark: str = "") -> str:
+    """Precision against recall of every row, over all trials pooled; the mark is its title."""
     everything = pooled(result)
     lowest = 1.0
     with figure((4.6, 4.3)) as (canvas, axes):
@@ -51,6 +55,7 @@ def precision_recall_svg(result: Evaluation, name: str = "pr") -> str:
         )
         floor = np.floor(20 * lowest - 0.5) / 20  # no curve goes there: the space is for the others
         axes.set(xlim=(0, 1.01), ylim=(max(0.0, floor), 1.01), xlabel="recall", ylabel="precision")
+        axes.set_title(mark)
         canvas.legend(loc="outside lower center", fontsize=8, ncols=3)
         return to_svg(canvas, name)
 
@@ -68,8 +73,8 @@ def reliability_bins(
     return mean, rate, trials[some].astype(float)
 
 
-def reliability_svg(result: Evaluation, name: str = "calibration") -> str:
-    """Success rate against score: a calibrated model lies on the diagonal."""
+def reliability_svg(result: Evaluation, name: str = "calibration", *, mark: str = "") -> str:
+    """Success rate against score: a calibrated model lies on the diagonal; the mark is its title."""
     everything = pooled(result)
     with figure((4.6, 4.3)) as (canvas, axes):
         axes.plot([0, 1], [0, 1], color=color_of("oracle"), linewidth=0.8, linestyle=":")
@@ -89,4 +94,5 @@ def reliability_svg(result: Evaluation, name: str = "calibration") -> str:
         axes.set(
             xlim=(-0.03, 1.03), ylim=(-0.03, 1.03), xlabel="score", ylabel="share of trials lifted"
         )
+        axes.set_title(mark)
         return to_svg(canvas, name)

@@ -35,6 +35,7 @@ def test_evaluate_writes_and_prints(folder, tmp_path, capsys):
     assert [row["saturated"] for row in folds["reach"]] == [True, False]
     assert [row["saturated"] for row in folds["point-robust"]] == [None]
     assert {path.name for path in plots.iterdir()} == {"precision_recall.svg", "reliability.svg"}
+    assert all("simulated labels" in path.read_text() for path in plots.iterdir())
     printed = capsys.readouterr().out
     assert "simulated labels" in printed and "point-robust" in printed
     assert "Leave one object out" in printed
@@ -57,10 +58,14 @@ def test_evaluate_writes_and_prints(folder, tmp_path, capsys):
         (["--pose-error", "-0.001,0.003"], "translation error"),
         (["--backend", "mpi"], "unknown scoring backend 'mpi'"),
         (["--scheduler", "tcp://127.0.0.1:1"], "is for --backend dask"),
-        (["--json", "/proc/nowhere/x.json", "--models", "reach"], "cannot write"),
+        (["--json", "/proc/nowhere/x.json"], "cannot write"),
+        (["--markdown", "/proc/nowhere/x.md"], "cannot write"),
+        (["--plots", "/proc/nowhere"], "cannot write"),
+        (["--jobs", "0"], "--jobs is 0"),
     ],
 )
-def test_evaluate_refuses_in_one_line(folder, capsys, extra, message):
+def test_evaluate_refuses_in_one_line_before_the_work(folder, capsys, monkeypatch, extra, message):
+    monkeypatch.setattr("reach.evaluation.compare.tabulate", None)
     assert main(["evaluate", str(folder), *extra]) == 2
     error = capsys.readouterr().err.strip().splitlines()[-1]
     assert error.startswith("error: ") and message in error
@@ -106,6 +111,8 @@ def test_report_and_fit(folder, tmp_path, capsys):
     assert main(["report", str(folder), "--out", str(page), "--models", "reach"]) == 0
     assert capsys.readouterr().out.strip() == str(page)
     assert page.read_text().startswith("<!doctype html>")
+    assert main(["fit", str(folder), "--samples", "4"]) == 0
+    assert capsys.readouterr().out.startswith("simulated labels")
     assert main(["fit", str(folder), "--samples", "4", "--json"]) == 0
     found = json.loads(capsys.readouterr().out)
     assert set(found["parameters"]) == {"friction", "compliance", "translation"}
