@@ -172,6 +172,7 @@ def score_all(
     """Score grasps in their order; those on the same stable pose are judged in one batch."""
     from rich.progress import Progress, TimeElapsedColumn
 
+    from reach.models.registry import warm_up
     from reach.scene import Scene
 
     hand = gripper_named(gripper)
@@ -185,8 +186,10 @@ def score_all(
             def show(count: int, before: int = before) -> None:
                 bar.update(task, completed=before + count)
 
+            scene = Scene(part, hand, T_world_object)
+            warm_up(scorer, scene, grasps[indices[0]].grasp)
             scored = scorer.score_many(
-                Scene(part, hand, T_world_object),
+                scene,
                 [grasps[index].grasp for index in indices],
                 pose_error=error,
                 seed=seed,
