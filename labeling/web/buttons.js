@@ -9,7 +9,8 @@ export function drawActions(page, state, about, usable) {
   const may = (id, allowed) => { byId(id).disabled = !(usable && allowed && state !== "STOPPED" && state !== "ENDED"); };
   byId("do-placed").hidden = !placing;
   may("do-placed", placing && state === "PLACE_OBJECT");
-  ["do-success", "do-failure", "do-rotated"].forEach((id) => { byId(id).hidden = placing; may(id, Boolean(about)); });
+  const choosing = state === "CONFIRM_POSE" && !about;
+  ["do-success", "do-failure", "do-rotated"].forEach((id) => { byId(id).hidden = placing || choosing; may(id, Boolean(about)); });
   byId("do-rotated").setAttribute("aria-pressed", String(page.rotated));
   const earlier = reviewing && !view.second && about?.label;
   may("do-undo", Boolean(view.undoable || earlier));

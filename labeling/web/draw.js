@@ -29,7 +29,7 @@ const BANNERS = {
     : `${trial.again_because ? `Once more (${words(trial.again_because)}). ` : ""}Put it down as in the picture, hands away, then confirm.`],
   CAPTURE: () => ["Looking", "The camera takes a depth image."],
   REGISTER: () => ["Finding the object", "The mesh is fitted to the image."],
-  CONFIRM_POSE: () => ["Which pose is right?", "Two poses explain the image equally well."],
+  CONFIRM_POSE: (trial) => ["Which pose is right?", `${1 + (trial.info.rivals ?? []).length} poses explain the image equally well.`],
   EXECUTE: () => ["The robot moves", "Keep clear. Watch whether the object is held."],
   AWAITING_LABEL: (trial) => ["Was it stably lifted?", trial.recovered ? "This record was saved after a crash; label it if you saw it, else redo." : "Clear of the table by 50 mm and still held after 1 s."],
   RESET: () => ["Going home", "The robot opens its jaws and leaves the table."],

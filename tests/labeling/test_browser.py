@@ -464,3 +464,12 @@ def test_pictures_show_how_to_place_and_what_was_found(
     page.wait("return document.querySelector('#overlay img').naturalWidth === 8")
     assert page.element("overlay").is_displayed() and not page.element("placing").is_displayed()
     assert "0.930" in page.element("registration").text
+    take.advance(Phase.CONFIRM_POSE, {"rivals": [{}, {}]})
+    page.until_state("CONFIRM_POSE")
+    page.wait("return document.querySelectorAll('#choices button').length === 4")
+    assert "3 poses" in page.element("banner").text
+    edges = [
+        f"document.getElementById('{one}').getBoundingClientRect()"
+        for one in ("overlay", "choices")
+    ]
+    assert page.run(f"return {edges[0]}.bottom <= {edges[1]}.top"), "the choice covers the picture"
