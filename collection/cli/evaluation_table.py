@@ -94,7 +94,7 @@ def _cells(name: str, row: Mapping[str, Any]) -> list[str]:
     return [
         name,
         _number(row["ap"]),
-        f"{interval[0]:.2f}-{interval[1]:.2f}" if interval else "",
+        f"{interval[0]:.2f}-{interval[1]:.2f}" if interval else "-",
         *(_number(row[key]) for key in METRICS[1:]),
         f"{row['seconds_per_grasp']:.2g}",
     ]

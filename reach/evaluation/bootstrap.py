@@ -2,6 +2,10 @@
 
 All models see the same draws, so that the interval of a difference is narrower than the two
 intervals suggest, as it should be.
+
+A grasp's trials are not drawn again: what chance did to them scatters the observed grasps already,
+and drawing them would count it twice. On made-up data (10 objects of 10 grasps of 5 trials) the
+stated deviation is 1.2 to 1.3 times the true one; with trials drawn as well 1.4 to 1.7 times.
 """
 
 from __future__ import annotations
@@ -18,6 +22,8 @@ DRAWS = 2000
 
 Interval = tuple[float, float] | None
 """Low and high end; None where nothing is defined."""
+FEWEST_GRASPS = 5
+"""Of a whole data set, below which drawing grasps tells nothing of the scatter of grasps."""
 Metric = Callable[[ObjectOutcomes, FloatArray, FloatArray | None], FloatArray]
 
 OBJECT_METRICS: Mapping[str, Metric] = {
@@ -79,3 +85,14 @@ def interval(values: FloatArray, level: float = 0.95) -> Interval:
     tail = 50.0 * (1.0 - level)
     low, high = np.percentile(defined, [tail, 100.0 - tail])
     return float(low), float(high)
+
+
+def told(outcomes: Outcomes) -> tuple[str, ...]:
+    """Metrics whose scatter these labels can tell; of the others an interval would be no news.
+
+    Few grasps drawn again are the same few. And where no trial failed, AP is 1 in every draw.
+    """
+    if sum(len(one.trials) for one in outcomes.objects) < FEWEST_GRASPS:
+        return ()
+    failed = any((one.successes < one.trials).any() for one in outcomes.objects)
+    return ("ap", "ar", "f1", "mae", "brier") if failed else ("ar", "mae", "brier")

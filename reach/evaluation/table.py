@@ -11,7 +11,7 @@ import numpy as np
 from reach.arrays import FloatArray
 from reach.errors import UnknownNameError
 from reach.evaluation import metrics
-from reach.evaluation.bootstrap import DRAWS, OBJECT_METRICS, Interval, bootstrap, interval
+from reach.evaluation.bootstrap import DRAWS, OBJECT_METRICS, Interval, bootstrap, interval, told
 from reach.evaluation.cases import GraspCase, Outcomes, check_scores
 from reach.evaluation.gains import Gain, gains
 from reach.evaluation.references import REFERENCE_NAMES
@@ -28,7 +28,7 @@ class ModelRow:
         name: of the model or reference.
         mean: metric -> average over objects; None where no object defines it. F1 is that of the
             two averages.
-        intervals: metric -> 95 % bootstrap interval.
+        intervals: metric -> 95 % bootstrap interval; None where the labels cannot tell it.
         above_overlap: metric -> 95 % bootstrap interval of the difference to the overlap row.
         majority: the same averages with one majority label a grasp.
         per_object: object -> metric -> value, None where undefined.
@@ -170,13 +170,14 @@ def _row(
 ) -> ModelRow:
     drawn = resampled[one.name]
     overlap = resampled.get("overlap")
+    known = told(outcomes)
     above: dict[str, Interval] = {}
     if overlap is not None and one.name not in REFERENCE_NAMES:
-        above = {key: interval(drawn[key] - overlap[key]) for key in METRIC_NAMES}
+        above = {key: interval(drawn[key] - overlap[key]) for key in known}
     return ModelRow(
         one.name,
         mean_metrics(outcomes, one.values),
-        {key: interval(drawn[key]) for key in METRIC_NAMES},
+        {key: interval(drawn[key]) if key in known else None for key in METRIC_NAMES},
         above,
         mean_metrics(outcomes.majority(), one.values),
         object_metrics(outcomes, one.values),

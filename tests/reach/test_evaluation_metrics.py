@@ -8,7 +8,7 @@ from sklearn.metrics import average_precision_score, brier_score_loss, recall_sc
 
 from reach.arrays import frozen
 from reach.evaluation import metrics
-from reach.evaluation.bootstrap import bootstrap, interval
+from reach.evaluation.bootstrap import bootstrap, interval, told
 from reach.evaluation.cases import ObjectOutcomes, Outcomes
 from reach.evaluation.gains import gains
 from reach.evaluation.table import mean_metrics
@@ -170,6 +170,18 @@ def test_bootstrap_spread_matches_the_two_stage_variance():
     assert np.isnan(drawn["one"]["ap"]).mean() == pytest.approx(0.25, abs=0.03)
     assert set(drawn["one"]["ap"][np.isfinite(drawn["one"]["ap"])]) == {1.0}
     assert interval(np.array([np.nan])) is None
+
+
+def test_no_interval_where_the_labels_cannot_tell_one():
+    """Two grasps that always work have an AP of 1 in every draw, and it means nothing."""
+
+    def only(successes, trials):
+        return Outcomes((outcomes(successes, trials),), (np.arange(len(trials)),))
+
+    assert told(only([1, 1], [1, 1])) == ()
+    assert told(only([5, 0, 3, 1], [5] * 4)) == ()
+    assert told(only([5] * 5, [5] * 5)) == ("ar", "mae", "brier")
+    assert set(told(only([5, 5, 5, 5, 4], [5] * 5))) == {"ap", "ar", "f1", "mae", "brier"}
 
 
 def test_gain_is_paired_and_judged_as_the_paper_states_it():
