@@ -29,11 +29,11 @@ from labeling.console import Console
 from labeling.controller import SessionController
 from labeling.errors import SessionEndingError
 from labeling.server import ConsoleServer, free_port
-from logs.events import Noted, Phase, Scored, SensorVerdict, Source
-from logs.mirror import AnnotationMirror
-from logs.mirrored_journal import MirroredJournal
-from logs.session import SessionDescriptor, SessionFolder, open_segment
-from logs.state import PlannedEntry, SessionState
+from logs.journal.events import Noted, Phase, Scored, SensorVerdict, Source
+from logs.journal.state import PlannedEntry, SessionState
+from logs.session.folder import SessionDescriptor, SessionFolder, open_segment
+from logs.session.mirror import AnnotationMirror
+from logs.session.mirrored_journal import MirroredJournal
 
 CHROMIUM, DRIVER = shutil.which("chromium"), shutil.which("chromedriver")
 FLAGS = (

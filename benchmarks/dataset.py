@@ -14,8 +14,8 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import TypeVar
 
-from logs.dataset_files import FORMATS, read_dataset, write_dataset
-from logs.dataset_sources import load_labeled
+from logs.dataset.files import FORMATS, read_dataset, write_dataset
+from logs.dataset.sources import load_labeled
 from reach.evaluation.compare import compare, scorers_of
 from reach.pose_error import PoseError
 

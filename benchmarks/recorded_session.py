@@ -20,14 +20,14 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from logs import events as ev
-from logs.index import list_takes, rebuild_index
-from logs.recorder import TrialRecorder
-from logs.rerun_view import derive_rrd
-from logs.session import SessionFolder
-from logs.session_overview import counting
-from logs.session_view import write_session_view
-from logs.trial_record import TrialRecord, read_record
+from logs.journal import events as ev
+from logs.record.recorder import TrialRecorder
+from logs.record.trial_record import TrialRecord, read_record
+from logs.session.folder import SessionFolder
+from logs.session.index import list_takes, rebuild_index
+from logs.view.session import write_session_view
+from logs.view.session_overview import counting
+from logs.view.trial import derive_rrd
 
 
 class Stopwatch:

@@ -21,12 +21,12 @@ from types import ModuleType
 
 import numpy as np
 
-from logs import events as ev
-from logs.recorder import TrialRecorder
-from logs.records import ExitStatus
-from logs.session import SessionDescriptor, SessionFolder
-from logs.state import PlannedEntry
-from logs.streams import DepthImage
+from logs.journal import events as ev
+from logs.journal.state import PlannedEntry
+from logs.record.recorder import TrialRecorder
+from logs.record.records import ExitStatus
+from logs.record.streams import DepthImage
+from logs.session.folder import SessionDescriptor, SessionFolder
 
 FIXTURES = Path(__file__).resolve().parent.parent / "tests" / "logs" / "fixtures"
 SHAPE = (600, 840)
@@ -82,8 +82,8 @@ def record_one(made: ModuleType, folder: Path, depth, color) -> tuple[Stopwatch,
 
 
 def attachments(made: ModuleType):
-    from logs.descriptions import gripper_attachment, robot_attachment
-    from logs.mesh_attachment import mesh_attachment
+    from logs.record.descriptions import gripper_attachment, robot_attachment
+    from logs.record.mesh_attachment import mesh_attachment
     from reach.gripper import ParallelJawGripper
 
     gripper = gripper_attachment(ParallelJawGripper.yumi())
@@ -120,8 +120,8 @@ def trial_costs(made: ModuleType, root: Path) -> dict[str, float]:
 
 
 def view_cost(folder: Path) -> dict[str, float]:
-    from logs.rerun_view import derive_rrd
-    from logs.trial_record import read_record
+    from logs.record.trial_record import read_record
+    from logs.view.trial import derive_rrd
 
     derive_rrd(folder)
     results = {}
@@ -136,7 +136,7 @@ def view_cost(folder: Path) -> dict[str, float]:
 
 def session_costs(root: Path, template: Path, count: int) -> dict[str, float]:
     """List and rebuild the index of a large session, whose records are copies of one."""
-    from logs.index import list_takes, rebuild_index
+    from logs.session.index import list_takes, rebuild_index
 
     folder = large_session(root / "session", template, count)
     results = {"trials": float(count)}

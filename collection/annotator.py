@@ -20,17 +20,17 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Self, TypeVar
 
 from logs.errors import LogError
-from logs.events import Entry, Scored
-from logs.mirror import AnnotationMirror
+from logs.journal.events import Entry, Scored
+from logs.session.mirror import AnnotationMirror
 from logs.trial_folder import VIEW_NAME
 from reach.sources import source_digest
 
 if TYPE_CHECKING:
     from collection.scoring import Prediction
     from labeling.controller import SessionController
-    from logs.mirrored_journal import MirroredJournal
-    from logs.session import SessionFolder
-    from logs.state import TakeState
+    from logs.journal.state import TakeState
+    from logs.session.folder import SessionFolder
+    from logs.session.mirrored_journal import MirroredJournal
     from reach.pose_error import PoseError
 
 _Result = TypeVar("_Result")
@@ -218,6 +218,6 @@ def _score(folder: Path, models: Sequence[str], pose_error: PoseError) -> list[P
 
 
 def _derive_view(folder: Path) -> None:
-    from logs.rerun_view import derive_rrd
+    from logs.view.trial import derive_rrd
 
     derive_rrd(folder)

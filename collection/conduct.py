@@ -22,15 +22,15 @@ from collection.setup import (
     read_setup,
     same_station,
 )
-from logs.events import Source
-from logs.session import ACCEPTABLE_CHANGES, SessionFolder, open_segment
-from logs.state import SessionState
+from logs.journal.events import Source
+from logs.journal.state import SessionState
+from logs.session.folder import ACCEPTABLE_CHANGES, SessionFolder, open_segment
 from reach.errors import ReachError, UnknownNameError
 
 if TYPE_CHECKING:
     from collection.station import Station
     from labeling.controller import SessionController
-    from logs.mirrored_journal import MirroredJournal
+    from logs.session.mirrored_journal import MirroredJournal
 
 
 @dataclass(frozen=True, slots=True)
@@ -205,9 +205,9 @@ def _run(
     from collection.ending import stop_station
     from labeling.controller import SessionController
     from logs.disk import trials_left
-    from logs.mirror import AnnotationMirror
-    from logs.mirrored_journal import MirroredJournal
-    from logs.recovery import recover_session
+    from logs.session.mirror import AnnotationMirror
+    from logs.session.mirrored_journal import MirroredJournal
+    from logs.session.recovery import recover_session
 
     if asked.resume:
         for finding in recover_session(folder.path).findings:

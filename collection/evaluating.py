@@ -8,7 +8,7 @@ from collections.abc import Iterable
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from logs.dataset import Dataset
+    from logs.dataset.dataset import Dataset
     from reach.evaluation.protocol import Protocol
     from reach.evaluation.table import Evaluation
     from reach.pose_error import PoseError

@@ -18,8 +18,8 @@ if TYPE_CHECKING:
     from collection.setup import Setup
     from collection.station import Station
     from labeling.controller import SessionController
-    from logs.session import SessionFolder
-    from logs.state import TakeState, TrialState
+    from logs.journal.state import TakeState, TrialState
+    from logs.session.folder import SessionFolder
     from reach.objects import GraspObject
     from registration.frame import DepthFrame
     from registration.result import Registration

@@ -86,7 +86,7 @@ class Sitting:
     def actor(self) -> Actor:
         """The person, as the console knows them."""
         from labeling.commands import Actor
-        from logs.events import Source
+        from logs.journal.events import Source
 
         return Actor(self.person, Source.OPERATOR)
 

@@ -12,7 +12,7 @@ from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn
 
 from labeling.controller import SessionController
-from logs.events import Outcome
+from logs.journal.events import Outcome
 
 
 class SessionProgress:

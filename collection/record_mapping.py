@@ -12,9 +12,9 @@ import numpy as np
 from collection.plan_records import PlannedGrasp, PlannedPose, PlannedTrial
 from collection.robots import protocol
 from collection.robots.execution import Execution, Phase
-from logs import descriptions
-from logs.records import ExecutionRecord, RegistrationRecord, RivalRecord, TrialDescriptor
-from logs.streams import CameraRecord, DepthImage
+from logs.record import descriptions
+from logs.record.records import ExecutionRecord, RegistrationRecord, RivalRecord, TrialDescriptor
+from logs.record.streams import CameraRecord, DepthImage
 from reach.arrays import FloatArray
 from reach.grasp import Grasp
 from reach.objects import GraspObject

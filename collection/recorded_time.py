@@ -6,7 +6,7 @@ from pathlib import Path
 
 from mcap.reader import make_reader
 
-from logs.session import SessionFolder
+from logs.session.folder import SessionFolder
 
 
 def last_recorded_ns(session: Path) -> int:

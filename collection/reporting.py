@@ -59,7 +59,7 @@ def write_report(
         InvalidInputError: the page cannot be written.
     """
     from collection.evaluating import chosen_pose_error
-    from logs.dataset_sources import load_labeled
+    from logs.dataset.sources import load_labeled
     from logs.report.page import build_report
     from reach.evaluation.backends import cluster
     from reach.evaluation.compare import compare, scorers_of
@@ -93,7 +93,7 @@ def _covered(sources: Sequence[Path]) -> PlanCoverage | None:
     from collection.coverage import coverage
     from collection.setup import read_setup
     from logs.report.coverage import Bars, PlanCoverage
-    from logs.session import SESSION_NAME, SessionFolder
+    from logs.session.folder import SESSION_NAME, SessionFolder
     from reach.gripper import ParallelJawGripper
 
     if not all((source / SESSION_NAME).exists() for source in sources):
@@ -123,7 +123,7 @@ def _agreement(sources: Sequence[Path]) -> OperatorAgreement | None:
     """Of all sessions' operators together; None where no source is a session."""
     from labeling.agreement import joint_agreement
     from logs.report.agreement import OperatorAgreement
-    from logs.session import SESSION_NAME, SessionFolder
+    from logs.session.folder import SESSION_NAME, SessionFolder
 
     sessions = [source for source in sources if (source / SESSION_NAME).exists()]
     if not sessions:

@@ -9,12 +9,12 @@ from typing import TYPE_CHECKING
 from collection.annotator import mirror_score, scored_event
 from collection.scoring import score_take
 from collection.setup import stated_pose_error
-from logs.mirror import AnnotationMirror
-from logs.session import SessionFolder
-from logs.state import SessionState
+from logs.journal.state import SessionState
+from logs.session.folder import SessionFolder
+from logs.session.mirror import AnnotationMirror
 
 if TYPE_CHECKING:
-    from logs.state import TakeState
+    from logs.journal.state import TakeState
 
 
 def rescore(

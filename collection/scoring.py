@@ -13,11 +13,11 @@ from pathlib import Path
 
 import numpy as np
 
-from logs.annotations import PatchRecord
-from logs.descriptions import GRIPPER_DESCRIPTION, STATION_FILE, read_gripper
 from logs.errors import RecordReadError
-from logs.mesh_attachment import OBJECT_MESH, read_mesh
-from logs.trial_record import TrialRecord, read_record
+from logs.record.annotations import PatchRecord
+from logs.record.descriptions import GRIPPER_DESCRIPTION, STATION_FILE, read_gripper
+from logs.record.mesh_attachment import OBJECT_MESH, read_mesh
+from logs.record.trial_record import TrialRecord, read_record
 from reach.arrays import FloatArray
 from reach.evaluation.scored import used_parameters
 from reach.grasp import Grasp

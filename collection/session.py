@@ -24,8 +24,8 @@ from collection.trial import TrialContext, run_take
 from labeling.auto import ACTOR
 from labeling.commands import AnswerStatus, Command, CommandKind
 from labeling.errors import SessionEndingError, TakeEndedError
-from logs.events import Paused
-from logs.state import STATION_HOLD
+from logs.journal.events import Paused
+from logs.journal.state import STATION_HOLD
 from registration.errors import RegistrationError
 
 if TYPE_CHECKING:
@@ -34,7 +34,7 @@ if TYPE_CHECKING:
     from collection.annotator import Annotator
     from labeling.controller import SessionController
     from labeling.take import Take
-    from logs.state import TrialState
+    from logs.journal.state import TrialState
 
 
 @dataclass(slots=True)

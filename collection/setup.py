@@ -18,9 +18,9 @@ from collection.errors import StationFileError
 from collection.options import SessionOptions
 from collection.plan_records import Plan
 from collection.versions import git_commit, package_versions
-from logs.mesh_attachment import mesh_attachment, read_mesh
-from logs.session import PLAN_NAME, SessionDescriptor, SessionFolder
-from logs.state import PlannedEntry
+from logs.journal.state import PlannedEntry
+from logs.record.mesh_attachment import mesh_attachment, read_mesh
+from logs.session.folder import PLAN_NAME, SessionDescriptor, SessionFolder
 from reach.objects import GraspObject
 
 if TYPE_CHECKING:

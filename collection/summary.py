@@ -6,12 +6,12 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from logs.events import Outcome
+from logs.journal.events import Outcome
 
 if TYPE_CHECKING:
     from rich.table import Table
 
-    from logs.state import SessionState, TakeState
+    from logs.journal.state import SessionState, TakeState
 
 ROBUST = "-robust"
 

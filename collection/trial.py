@@ -24,11 +24,11 @@ from collection.robots.half_turn import held_alike
 from collection.robots.motion import execute_grasp
 from collection.trial_watch import TrialWatch
 from collection.truth import registration_error, true_outcome
-from logs.descriptions import STATION_FILE, gripper_attachment, robot_attachment
-from logs.events import Phase, SensorVerdict
-from logs.mesh_attachment import mesh_attachment
-from logs.recorder import TrialRecorder
-from logs.records import AttachmentRecord, ExitStatus
+from logs.journal.events import Phase, SensorVerdict
+from logs.record.descriptions import STATION_FILE, gripper_attachment, robot_attachment
+from logs.record.mesh_attachment import mesh_attachment
+from logs.record.recorder import TrialRecorder
+from logs.record.records import AttachmentRecord, ExitStatus
 from reach.arrays import FloatArray
 from registration import register
 from registration.result import Registration

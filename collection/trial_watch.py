@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collection.robots.execution import PhaseEvent, TraceSample
 from collection.station import Station
-from logs.recorder import TrialRecorder
+from logs.record.recorder import TrialRecorder
 
 PICTURE_PERIOD_NS = 400_000_000
 """At most one color frame in this time."""

@@ -7,7 +7,7 @@ for statistics, and every name says that it is the truth.
 from __future__ import annotations
 
 from collection.operator_sim import CLEARANCE, SimulatedVerdict
-from logs.events import FailureReason, Outcome, TrueOutcome
+from logs.journal.events import FailureReason, Outcome, TrueOutcome
 from reach.arrays import FloatArray
 from reach.objects import GraspObject
 from reach.symmetry import pose_distance, symmetry

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import dataclass
 
-from logs.state import SessionState, TrialState
+from logs.journal.state import SessionState, TrialState
 
 
 @dataclass(frozen=True, slots=True)

@@ -15,8 +15,8 @@ from pydantic import JsonValue
 
 from labeling.commands import Actor, Command, CommandKind
 from labeling.controller import SessionController
-from logs.events import Phase, Source
-from logs.state import SessionState, TakeState, TrialState
+from logs.journal.events import Phase, Source
+from logs.journal.state import SessionState, TakeState, TrialState
 
 ACTOR: Final = Actor("simulated operator", Source.OPERATOR_SIM)
 

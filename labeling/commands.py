@@ -13,7 +13,7 @@ from typing import Annotated, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, JsonValue
 
-from logs.events import FailureReason, Outcome, RedoCause, Source
+from logs.journal.events import FailureReason, Outcome, RedoCause, Source
 
 
 class CommandKind(StrEnum):

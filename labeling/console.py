@@ -10,7 +10,7 @@ from typing import Literal
 from labeling.commands import Actor
 from labeling.controller import SessionController
 from labeling.pictures import PictureShelf
-from logs.state import TrialState
+from logs.journal.state import TrialState
 
 Recordings = Callable[[TrialState], Path | None]
 

@@ -28,10 +28,10 @@ from labeling.errors import SessionEndingError
 from labeling.rules import NEEDS_REVISION, TRIAL_KINDS, RefusedError, event_of
 from labeling.stop_count import StopCount
 from labeling.take import Take
-from logs import events as ev
 from logs.errors import DiskFullError, JournalWriteError
-from logs.events import AnyEvent, Entry
-from logs.state import SessionState, TrialState
+from logs.journal import events as ev
+from logs.journal.events import AnyEvent, Entry
+from logs.journal.state import SessionState, TrialState
 
 COMMAND_AGE_LIMIT: Final = 2.0
 """Seconds after which a command is refused: a thawed server finds old ones in its sockets."""

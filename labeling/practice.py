@@ -14,8 +14,8 @@ from labeling.controller import SessionController
 from labeling.errors import SessionEndingError, TakeEndedError
 from labeling.take import Take
 from logs.errors import JournalWriteError
-from logs.events import AnyEvent, Entry, Phase, SensorVerdict
-from logs.state import PlannedEntry, SessionState
+from logs.journal.events import AnyEvent, Entry, Phase, SensorVerdict
+from logs.journal.state import PlannedEntry, SessionState
 
 
 class MemoryJournal:

@@ -7,8 +7,8 @@ from typing import Final
 from pydantic import BaseModel, ConfigDict
 
 from labeling.view import View, label_view, trial_view
-from logs.events import Outcome
-from logs.state import SessionState, TakeState, TrialState
+from logs.journal.events import Outcome
+from logs.journal.state import SessionState, TakeState, TrialState
 
 DISAGREEMENT: Final = "disagreement"
 

@@ -10,10 +10,10 @@ from labeling.commands import Actor
 from labeling.console import Console
 from labeling.controller import SessionController
 from logs.errors import LogError
-from logs.mirror import AnnotationMirror
-from logs.mirrored_journal import MirroredJournal
-from logs.session import SessionFolder
-from logs.state import SessionState, TrialState
+from logs.journal.state import SessionState, TrialState
+from logs.session.folder import SessionFolder
+from logs.session.mirror import AnnotationMirror
+from logs.session.mirrored_journal import MirroredJournal
 
 
 @contextmanager
@@ -53,7 +53,7 @@ def review_console(
 
 def blind_recording(folder: SessionFolder, trial: TrialState) -> Path | None:
     """The view of a trial without label, contacts or scores; None if it cannot be drawn."""
-    from logs.rerun_view import fresh_view
+    from logs.view.trial import fresh_view
 
     take = trial.valid_take
     if take is None:

@@ -11,9 +11,9 @@ from typing import Final, cast
 from labeling import commands as cm
 from labeling.commands import Actor, Command, CommandKind, Value
 from labeling.errors import LabelingError
-from logs import events as ev
-from logs.events import AnyEvent, Phase
-from logs.state import SessionState, TakeState, TrialState
+from logs.journal import events as ev
+from logs.journal.events import AnyEvent, Phase
+from logs.journal.state import SessionState, TakeState, TrialState
 
 
 class RefusedError(LabelingError):

@@ -13,9 +13,9 @@ from typing import TYPE_CHECKING, Final, Literal
 from pydantic import JsonValue
 
 from labeling.errors import TakeEndedError
-from logs import events as ev
-from logs.events import LabelEvent, Phase, SensorVerdict
-from logs.state import TakeState, TrialState
+from logs.journal import events as ev
+from logs.journal.events import LabelEvent, Phase, SensorVerdict
+from logs.journal.state import TakeState, TrialState
 
 if TYPE_CHECKING:
     from labeling.controller import SessionController

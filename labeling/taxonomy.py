@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Final
 
-from logs.events import FailureReason, RedoCause
+from logs.journal.events import FailureReason, RedoCause
 
 RULE: Final = (
     "Success: the object is clear of the table by 50 mm and still held after 1 s."

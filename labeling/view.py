@@ -7,8 +7,8 @@ from typing import Any, Final
 
 from labeling.console import Console, no_recording
 from labeling.taxonomy import CAUSE_TEXT, KEYS, REASON_TEXT, RULE
-from logs.events import Outcome, Phase
-from logs.state import SessionState, TakeState, TrialState
+from logs.journal.events import Outcome, Phase
+from logs.journal.state import SessionState, TakeState, TrialState
 
 View = dict[str, Any]
 HISTORY_LENGTH: Final = 40

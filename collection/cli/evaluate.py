@@ -63,7 +63,7 @@ def evaluate(
     from collection.cli.evaluation_table import evaluation_table, print_table, progress_bars
     from collection.evaluating import chosen_pose_error, evaluation_content, model_names
     from collection.reporting import check_targets, write_text
-    from logs.dataset_sources import load_labeled
+    from logs.dataset.sources import load_labeled
     from reach.errors import InvalidInputError
     from reach.evaluation.backends import cluster
     from reach.evaluation.compare import compare, scorers_of

@@ -28,8 +28,8 @@ def export(
     - `reach export sessions/monday --to data/monday`
     - `reach export sessions/mon sessions/tue --to data/week --format all`
     """
-    from logs.dataset_files import FORMATS, write_dataset
-    from logs.dataset_sources import load_labeled
+    from logs.dataset.files import FORMATS, write_dataset
+    from logs.dataset.sources import load_labeled
 
     wanted = list(FORMATS) if formats == "all" else _split(formats)
     dataset = load_labeled(sources, unblinded=unblinded)

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 if TYPE_CHECKING:
-    from logs.registration_scatter import RegistrationScatter, Spread
+    from logs.dataset.registration_scatter import RegistrationScatter, Spread
     from reach.evaluation.fit import Fit
 
 UNITS = {"friction": "", "compliance": " m/N", "stiffness": " N/m^3", "translation": " m"}
@@ -36,8 +36,8 @@ def fit(
     - `reach fit data/physical --json`
     """
     from collection.cli.evaluation_table import progress_bars
-    from logs.dataset_sources import load_labeled
-    from logs.registration_scatter import registration_scatter
+    from logs.dataset.registration_scatter import registration_scatter
+    from logs.dataset.sources import load_labeled
     from reach.evaluation.fit import fit_parameters
     from reach.models.registry import make_scorer
 

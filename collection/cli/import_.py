@@ -41,8 +41,8 @@ def import_(
     - `reach import reach2019 --grasps physical/ --meshes meshes/ --out data/physical`
     - `reach import reach2019 --grasps mug.json --meshes meshes/ --masses grams.json --out data/mug`
     """
-    from logs.dataset_files import write_dataset
-    from logs.import_reach2019 import MassRule, import_reach2019, read_masses
+    from logs.dataset.files import write_dataset
+    from logs.dataset.from_reach2019 import MassRule, import_reach2019, read_masses
     from reach.arrays import positive
     from reach.errors import InvalidInputError, UnknownNameError
 

@@ -74,8 +74,8 @@ def _console(
 ) -> AbstractContextManager[Console]:
     from labeling.practice import practice_console
     from labeling.reviewing import review_console
-    from logs.recovery import recover_session
-    from logs.session import SessionFolder
+    from logs.session.folder import SessionFolder
+    from logs.session.recovery import recover_session
 
     if session is None:
         return practice_console(actor)
@@ -101,7 +101,7 @@ def _wait_for_interrupt() -> None:
 
 def _print_agreement(session: Path, *, as_json: bool) -> None:
     from labeling.agreement import operator_agreement
-    from logs.session import SessionFolder
+    from logs.session.folder import SessionFolder
 
     found = operator_agreement(SessionFolder.open(session).read_state())
     if as_json:

@@ -21,7 +21,7 @@ def recover(
 
     - `reach recover sessions/monday`
     """
-    from logs.recovery import recover_session
+    from logs.session.recovery import recover_session
 
     report = recover_session(session)
     if as_json:

@@ -46,7 +46,7 @@ def replay(
     - `reach replay sessions/monday --save monday.rrd --no-viewer`
     """
     from logs.errors import ViewError
-    from logs.viewer import show_recordings
+    from logs.view.viewer import show_recordings
 
     if blind and trial is None:
         raise ViewError("--blind hides what the overview is about; choose one trial with --trial")
@@ -69,18 +69,18 @@ def replay(
 
 
 def _trial(session: Path, wanted: str, *, blind: bool) -> Path:
-    from logs.find_trial import find_take
-    from logs.rerun_view import fresh_view
+    from logs.session.find_trial import find_take
+    from logs.view.trial import fresh_view
 
     return fresh_view(find_take(session, wanted), blind=blind)
 
 
 def _session(session: Path, model: str | None) -> list[Path]:
     """The overview, and the full views of the worst disagreements; all views are made fresh."""
-    from logs.index import list_takes
-    from logs.rerun_view import view_path
-    from logs.session_overview import counting, judging_model, overview
-    from logs.session_view import write_session_view
+    from logs.session.index import list_takes
+    from logs.view.session import write_session_view
+    from logs.view.session_overview import counting, judging_model, overview
+    from logs.view.trial import view_path
 
     rows = list_takes(session)
     judge = judging_model(counting(rows), model)
@@ -97,7 +97,7 @@ def _fresh_views(folders: Sequence[Path]) -> Iterator[Path]:
     from rich.progress import track
 
     from logs.errors import RecordError
-    from logs.rerun_view import fresh_view
+    from logs.view.trial import fresh_view
 
     console = Console(stderr=True)
     quiet = not console.is_terminal
@@ -113,7 +113,7 @@ def _serve(shown: Sequence[Path]) -> None:
     import os
     import signal
 
-    from logs.viewer import WebViewer
+    from logs.view.viewer import WebViewer
 
     for ending in (signal.SIGTERM, signal.SIGHUP):
         signal.signal(ending, signal.default_int_handler)  # so that the server ends with us

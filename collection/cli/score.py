@@ -113,7 +113,7 @@ def _refuse_beside_sessions(**options: object) -> None:
 def _score_sessions(sessions: Sequence[Path], names: Sequence[str], *, as_json: bool) -> None:
     from collection.cli.evaluation_table import progress_bars
     from collection.rescoring import rescore
-    from logs.session import SessionFolder
+    from logs.session.folder import SessionFolder
     from reach.models.registry import make_scorer
 
     # A name that does not exist is refused before anything is written.

@@ -20,7 +20,7 @@ def status(
     - `reach status sessions/monday --json`
     """
     from logs.disk import trials_left
-    from logs.session import SessionFolder
+    from logs.session.folder import SessionFolder
 
     folder = SessionFolder.open(session)
     state = folder.read_state()

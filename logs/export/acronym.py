@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from logs.dataset import Dataset
+from logs.dataset.dataset import Dataset
 from logs.export.grasps import GraspSummary
 from reach.objects import GraspObject
 

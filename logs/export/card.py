@@ -7,8 +7,8 @@ from collections.abc import Iterable, Mapping
 from importlib import resources
 from typing import Any
 
-from logs.dataset import Dataset
-from logs.dataset_manifest import FRAMES, UNITS
+from logs.dataset.dataset import Dataset
+from logs.dataset.manifest import FRAMES, UNITS
 from logs.export.columns import columns, scored_models
 from logs.report.footnotes import ORACLE, footnotes
 

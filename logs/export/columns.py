@@ -13,7 +13,7 @@ from typing import Any, Literal
 
 import numpy as np
 
-from logs.labeled_trial import Execution, Label, LabeledTrial, StoredScore
+from logs.dataset.labeled_trial import Execution, Label, LabeledTrial, StoredScore
 from reach.arrays import FloatArray
 
 Kind = Literal["text", "integer", "number", "truth", "numbers", "texts"]

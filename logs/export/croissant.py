@@ -9,7 +9,7 @@ import json
 from collections.abc import Mapping
 from typing import Any
 
-from logs.dataset import Dataset
+from logs.dataset.dataset import Dataset
 from logs.export.columns import Column, Kind, columns, scored_models
 
 CROISSANT_NAME = "croissant.json"

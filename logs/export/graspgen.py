@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import Mapping
 
-from logs.dataset import Dataset
+from logs.dataset.dataset import Dataset
 from logs.export.grasps import GraspSummary
 
 

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from logs.dataset import Dataset
-from logs.labeled_trial import LabeledTrial
+from logs.dataset.dataset import Dataset
+from logs.dataset.labeled_trial import LabeledTrial
 from reach.arrays import FloatArray
 from reach.evaluation.overlap import closed_width
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from logs.dataset import Dataset
+from logs.dataset.dataset import Dataset
 from logs.export.grasps import GraspSummary
 from logs.export.names import safe_name
 from reach.gripper import ParallelJawGripper

@@ -26,9 +26,9 @@ from pydantic import (
     ValidationError,
 )
 
-from logs.dataset import Dataset
+from logs.dataset.dataset import Dataset
+from logs.dataset.labeled_trial import LabeledTrial
 from logs.errors import DatasetError
-from logs.labeled_trial import LabeledTrial
 from reach.arrays import FloatArray
 from reach.transforms import inverse, project_to_rotation
 

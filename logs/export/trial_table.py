@@ -9,9 +9,9 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
+from logs.dataset.labeled_trial import LabeledTrial
 from logs.errors import DatasetError
 from logs.export.columns import Column, Kind, columns, scored_models, trial_of_row
-from logs.labeled_trial import LabeledTrial
 
 PARQUET_NAME = "trials.parquet"
 CSV_NAME = "trials.csv"

@@ -17,8 +17,8 @@ from logs.report.charts import FAILURE_COLOR, MODEL_COLORS, SUCCESS_COLOR, figur
 from reach.arrays import FloatArray
 
 if TYPE_CHECKING:
-    from logs.dataset import Dataset
-    from logs.labeled_trial import LabeledTrial
+    from logs.dataset.dataset import Dataset
+    from logs.dataset.labeled_trial import LabeledTrial
 
 FEWEST = 6
 """Fewer trials show no trend."""

@@ -18,7 +18,7 @@ from logs.report.rendering import data_uri, object_solid, render
 from reach.evaluation.table import Evaluation
 
 if TYPE_CHECKING:
-    from logs.dataset import Dataset
+    from logs.dataset.dataset import Dataset
     from logs.report.agreement import OperatorAgreement
     from reach.evaluation.cases import GraspCase
     from reach.pose_error import PoseError

@@ -16,8 +16,8 @@ from reach.evaluation.references import REFERENCE_NAMES
 from reach.evaluation.table import Evaluation, ModelRow
 
 if TYPE_CHECKING:
-    from logs.dataset import Dataset
-    from logs.labeled_trial import LabeledTrial
+    from logs.dataset.dataset import Dataset
+    from logs.dataset.labeled_trial import LabeledTrial
 
 WORST = 4
 """Cards of false positives, and of false negatives."""

@@ -13,7 +13,7 @@ from reach.evaluation.overlap import closed_width
 from reach.transforms import apply
 
 if TYPE_CHECKING:
-    from logs.dataset import Dataset
+    from logs.dataset.dataset import Dataset
 
 PAD_COLOR = (0.15, 0.39, 0.92)
 PAD_OPACITY = 0.55

@@ -6,9 +6,9 @@ from importlib import resources
 import pytest
 
 from collection.cli.main import main
-from logs.events import SessionOpened
-from logs.journal import read_journal
-from logs.session import SessionFolder
+from logs.journal.events import SessionOpened
+from logs.journal.file import read_journal
+from logs.session.folder import SessionFolder
 
 BEFORE, AFTER = "calibration_offset = 0.0005", "calibration_offset = 0.0004"
 FAULT = '\n[[simulation.faults]]\nkind = "emergency_stop"\nattempt = 2\n'

@@ -7,8 +7,8 @@ from pathlib import Path
 from collection.cli.main import main
 from collection.clock import SimulatedClock
 from collection.recorded_time import last_recorded_ns
-from logs.record_facts import read_facts
-from logs.session import SessionFolder
+from logs.record.facts import read_facts
+from logs.session.folder import SessionFolder
 
 WORDS = "--station simulated --objects cube_3cm --grasps 1 --repeats 1 --seed 8 --operator auto"
 

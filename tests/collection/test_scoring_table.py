@@ -9,10 +9,10 @@ import pytest
 import trimesh
 
 from collection.scoring import scene_of
-from logs.descriptions import STATION_FILE, gripper_attachment
 from logs.errors import RecordReadError
-from logs.mesh_attachment import mesh_attachment
-from logs.records import AttachmentRecord
+from logs.record.descriptions import STATION_FILE, gripper_attachment
+from logs.record.mesh_attachment import mesh_attachment
+from logs.record.records import AttachmentRecord
 from reach import GraspObject, ParallelJawGripper
 from reach.transforms import make_transform
 

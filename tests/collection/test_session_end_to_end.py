@@ -9,10 +9,10 @@ from pathlib import Path
 import pytest
 
 from collection.cli.main import main
-from logs.events import Executed, Labelled, Scored, Source
-from logs.journal import read_journal
-from logs.session import SessionFolder
-from logs.trial_record import read_record
+from logs.journal.events import Executed, Labelled, Scored, Source
+from logs.journal.file import read_journal
+from logs.record.trial_record import read_record
+from logs.session.folder import SessionFolder
 from reach.models.names import ANALYTIC_NAMES
 
 REACH = Path(sys.executable).with_name("reach")

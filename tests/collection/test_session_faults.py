@@ -6,9 +6,9 @@ from importlib import resources
 import pytest
 
 from collection.cli.main import main
-from logs.events import Voided
-from logs.journal import read_journal
-from logs.session import SessionFolder
+from logs.journal.events import Voided
+from logs.journal.file import read_journal
+from logs.session.folder import SessionFolder
 
 
 def station_with(folder, *faults):

@@ -19,11 +19,11 @@ from typing import Any
 import numpy as np
 import pytest
 
-from logs.annotation_files import read_annotations
-from logs.events import Executed, Labelled, Scored
-from logs.journal import JOURNAL_NAME, scan_journal
-from logs.session import SessionFolder
-from logs.trial_record import read_record
+from logs.journal.events import Executed, Labelled, Scored
+from logs.journal.file import JOURNAL_NAME, scan_journal
+from logs.record.annotation_files import read_annotations
+from logs.record.trial_record import read_record
+from logs.session.folder import SessionFolder
 from reach.models.names import ANALYTIC_NAMES
 
 REACH = Path(sys.executable).with_name("reach")

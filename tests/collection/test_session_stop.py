@@ -15,8 +15,8 @@ from collection.robots.simulated_arm import SimulatedArm
 from collection.session import Session
 from labeling.commands import Actor, Command, CommandKind
 from labeling.controller import SessionController
-from logs.events import Source
-from logs.session import SessionFolder
+from logs.journal.events import Source
+from logs.session.folder import SessionFolder
 from registration.errors import NoGoodPoseError
 
 ANN = Actor("ann", Source.OPERATOR)

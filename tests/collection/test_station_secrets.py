@@ -14,7 +14,7 @@ from collection.plan import make_plan
 from collection.robots.yumi.config import DELIVERED, PASSWORD_VARIABLE, YumiConfig
 from collection.setup import Setup
 from collection.station import PACKAGED, Station, build_station, parse_station
-from logs.session import SessionFolder
+from logs.session.folder import SessionFolder
 
 TEXT = (PACKAGED / "yumi.toml").read_text(encoding="utf-8")
 SECRET = "o,pen-sesame#7"

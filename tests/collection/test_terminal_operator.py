@@ -17,7 +17,7 @@ from pathlib import Path
 
 import pytest
 
-from logs.session import SessionFolder
+from logs.session.folder import SessionFolder
 
 REACH = Path(sys.executable).with_name("reach")
 COMMAND = [

@@ -20,9 +20,9 @@ from labeling.controller import SessionController
 from labeling.pictures import PictureShelf
 from labeling.server import ConsoleServer, free_port
 from labeling.take import Take
-from logs.events import Phase, Scored, SensorVerdict, Source
-from logs.session import SessionDescriptor, SessionFolder, open_segment
-from logs.state import PlannedEntry, SessionState, TrialState
+from logs.journal.events import Phase, Scored, SensorVerdict, Source
+from logs.journal.state import PlannedEntry, SessionState, TrialState
+from logs.session.folder import SessionDescriptor, SessionFolder, open_segment
 
 SETUP = {"robot": "r1", "camera": "c1", "calibration": "k1", "plan": "p1"}
 ANN = Actor("ann", Source.OPERATOR)

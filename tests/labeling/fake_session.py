@@ -14,9 +14,17 @@ from labeling.auto import AutoOperator
 from labeling.controller import SessionController
 from labeling.errors import SessionEndingError, TakeEndedError
 from labeling.take import Take
-from logs.events import FailureReason, Outcome, Phase, Scored, SensorVerdict, Source, TrueOutcome
-from logs.session import SessionDescriptor, SessionFolder, open_segment
-from logs.state import PlannedEntry, SessionState
+from logs.journal.events import (
+    FailureReason,
+    Outcome,
+    Phase,
+    Scored,
+    SensorVerdict,
+    Source,
+    TrueOutcome,
+)
+from logs.journal.state import PlannedEntry, SessionState
+from logs.session.folder import SessionDescriptor, SessionFolder, open_segment
 
 SETUP = {"robot": "r1", "camera": "c1", "calibration": "k1", "plan": "p1"}
 

@@ -16,7 +16,7 @@ from labeling.errors import OutsideSessionError, UnsafeAddressError
 from labeling.pictures import PictureShelf
 from labeling.recordings import TICKET_SECONDS, RecordingTickets
 from labeling.server import ConsoleServer, free_port
-from logs.events import Source
+from logs.journal.events import Source
 
 PNG = b"\x89PNG\r\n\x1a\n"
 ADDRESSES = [

@@ -9,7 +9,7 @@ import pytest
 
 from labeling.agreement import cohen_kappa, operator_agreement
 from labeling.commands import Actor
-from logs.events import Source
+from logs.journal.events import Source
 
 BO = Actor("bo", Source.OPERATOR)
 CY = Actor("cy", Source.OPERATOR)

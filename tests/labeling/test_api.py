@@ -13,7 +13,7 @@ import httpx
 import pytest
 
 from labeling.presence import SILENCE_LIMIT, Presence
-from logs.journal import read_journal
+from logs.journal.file import read_journal
 
 PNG = b"\x89PNG\r\n\x1a\n" + b"pixels"
 

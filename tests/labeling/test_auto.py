@@ -10,9 +10,9 @@ import pytest
 
 from labeling.auto import AutoOperator
 from labeling.errors import SessionEndingError
-from logs.events import Phase, SensorVerdict
-from logs.journal import read_journal
-from logs.session import SessionFolder
+from logs.journal.events import Phase, SensorVerdict
+from logs.journal.file import read_journal
+from logs.session.folder import SessionFolder
 
 
 def test_a_whole_session_runs_and_every_decision_is_marked_simulated(

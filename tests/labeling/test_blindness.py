@@ -9,9 +9,9 @@ from typing import Any
 import pytest
 
 from labeling.commands import Actor
-from logs.events import Source
-from logs.session import SessionDescriptor, SessionFolder
-from logs.state import PlannedEntry, SessionState
+from logs.journal.events import Source
+from logs.journal.state import PlannedEntry, SessionState
+from logs.session.folder import SessionDescriptor, SessionFolder
 
 BO = Actor("bo", Source.OPERATOR)
 REPEATS = 3

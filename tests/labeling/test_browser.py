@@ -11,8 +11,8 @@ import pytest
 
 from labeling.console import Console
 from labeling.server import ConsoleServer
-from logs.events import Phase
-from logs.journal import read_journal
+from logs.journal.events import Phase
+from logs.journal.file import read_journal
 
 CHROMIUM = shutil.which("chromium")
 DRIVER = shutil.which("chromedriver")

@@ -13,8 +13,8 @@ import pytest
 from labeling.commands import Actor, Command, CommandKind
 from labeling.errors import SessionEndingError, TakeEndedError
 from logs.errors import DiskFullError
-from logs.events import Outcome, Phase, Source
-from logs.journal import read_journal
+from logs.journal.events import Outcome, Phase, Source
+from logs.journal.file import read_journal
 
 BOB = Actor("bob", Source.OPERATOR)
 

@@ -13,8 +13,8 @@ from typing import Any
 
 import pytest
 
-from logs.journal import JOURNAL_NAME, read_journal
-from logs.session import SESSION_NAME, SessionFolder
+from logs.journal.file import JOURNAL_NAME, read_journal
+from logs.session.folder import SESSION_NAME, SessionFolder
 
 TRIALS = 40
 SCRIPT = Path(__file__).with_name("fake_session.py")

@@ -15,7 +15,7 @@ from urllib.parse import urlsplit
 import httpx
 import pytest
 
-from logs.journal import read_journal
+from logs.journal.file import read_journal
 
 ROOT = Path(__file__).parents[2]
 LABEL = "import sys; from collection.cli.label import label; import typer; typer.run(label)"
@@ -126,7 +126,7 @@ def test_status_counts_a_session_under_way(bench: Any) -> None:
 
 def test_status_imports_nothing_heavy() -> None:
     script = (
-        "import sys; from collection.cli.status import status; import logs.session, logs.disk;"
+        "import sys; from collection.cli.status import status; import logs.session.folder, logs.disk;"
         "heavy = {'numpy', 'fastapi', 'rerun', 'pandas', 'mcap', 'textual'} & set(sys.modules);"
         "print(sorted(heavy))"
     )

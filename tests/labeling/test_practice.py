@@ -11,8 +11,8 @@ from labeling.auto import AutoOperator
 from labeling.commands import Actor
 from labeling.practice import practice_console
 from labeling.view import console_view
-from logs.events import Source
-from logs.state import SessionState
+from logs.journal.events import Source
+from logs.journal.state import SessionState
 
 ACTOR = Actor("ann", Source.OPERATOR)
 

@@ -7,7 +7,7 @@ from typing import Any
 
 from labeling.commands import Actor
 from labeling.stop_count import StopCount
-from logs.events import Source
+from logs.journal.events import Source
 
 ANN = Actor("ann", Source.OPERATOR)
 

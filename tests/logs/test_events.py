@@ -8,9 +8,9 @@ from typing import Any, get_args
 import pytest
 from pydantic import ValidationError
 
-from logs import events as ev
-from logs.events import EVENT, AnyEvent, Entry, FailureReason, Outcome, Phase, Source
-from logs.state import PlannedEntry, SessionState
+from logs.journal import events as ev
+from logs.journal.events import EVENT, AnyEvent, Entry, FailureReason, Outcome, Phase, Source
+from logs.journal.state import PlannedEntry, SessionState
 
 WHO: dict[str, Any] = {"operator": "ann", "source": Source.OPERATOR}
 TAKE: dict[str, Any] = {"trial_id": "a", "take": 1}

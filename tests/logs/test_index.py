@@ -10,11 +10,11 @@ from pathlib import Path
 
 import pytest
 
-from logs import events as ev
 from logs.errors import JournalDamagedError, NotASessionError
-from logs.index import list_takes, rebuild_index
-from logs.index_table import INDEX_NAME
-from logs.session import SessionFolder
+from logs.journal import events as ev
+from logs.session.folder import SessionFolder
+from logs.session.index import list_takes, rebuild_index
+from logs.session.index_table import INDEX_NAME
 from logs.trial_folder import (
     PART_NAME,
     RECORD_NAME,
@@ -145,7 +145,7 @@ def test_a_change_is_told_from_the_journal_s_tail(session: SessionFolder, monkey
     with session.open_journal() as journal:
         journal.append(ev.Scored(trial_id=trial_id, take=1, model="new", version="1", value=0.25))
     with monkeypatch.context() as patched:
-        patched.setattr("logs.index.read_journal", None)  # reading it all would fail
+        patched.setattr("logs.session.index.read_journal", None)  # reading it all would fail
         assert list_takes(session.path)[1].scores["new"] == 0.25
     assert list_takes(session.path)[0].scores == {"point": 0.3, "reach": 0.37}
 

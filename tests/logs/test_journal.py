@@ -10,8 +10,15 @@ from pathlib import Path
 import pytest
 
 from logs.errors import JournalDamagedError, JournalWriteError, SessionLockedError
-from logs.events import JournalRepaired, Noted, Source
-from logs.journal import JOURNAL_NAME, TORN_NAME, Journal, encode_entry, read_journal, scan_journal
+from logs.journal.events import JournalRepaired, Noted, Source
+from logs.journal.file import (
+    JOURNAL_NAME,
+    TORN_NAME,
+    Journal,
+    encode_entry,
+    read_journal,
+    scan_journal,
+)
 
 
 def note(text: str) -> Noted:

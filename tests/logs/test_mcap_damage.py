@@ -5,11 +5,11 @@ from pathlib import Path
 
 import pytest
 
-from logs.annotation_files import read_annotations
 from logs.errors import RecordReadError
-from logs.mcap_walk import Walk, walk
-from logs.recorder import TrialRecorder
-from logs.trial_record import read_record
+from logs.record.annotation_files import read_annotations
+from logs.record.mcap_walk import Walk, walk
+from logs.record.recorder import TrialRecorder
+from logs.record.trial_record import read_record
 
 CUTS = FLIPS = 2000
 

@@ -6,8 +6,8 @@ import sys
 from pathlib import Path
 
 from logs.errors import RecordReadError
+from logs.record.trial_record import read_record
 from logs.trial_folder import PART_NAME, RECORD_NAME
-from logs.trial_record import read_record
 
 SCRIPT = Path(__file__).parent / "fixtures" / "record_on_full_disk.py"
 

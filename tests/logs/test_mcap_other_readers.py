@@ -9,10 +9,10 @@ import pytest
 from mcap.reader import make_reader
 from mcap_protobuf.decoder import DecoderFactory
 
-from logs import topics
-from logs.recorder import TrialRecorder
-from logs.salvage import salvage
-from logs.viewer import viewer_program
+from logs.record import topics
+from logs.record.recorder import TrialRecorder
+from logs.record.salvage import salvage
+from logs.view.viewer import viewer_program
 
 
 @pytest.fixture(scope="module")

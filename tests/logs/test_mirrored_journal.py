@@ -9,14 +9,14 @@ from typing import Any
 
 import pytest
 
-from logs.annotation_files import read_annotations
 from logs.errors import JournalWriteError
-from logs.events import Executed, Labelled, Outcome, Scored, SensorVerdict, Source, Undone
-from logs.journal import read_journal
-from logs.mirror import AnnotationMirror
-from logs.mirrored_journal import MirroredJournal
-from logs.session import SessionDescriptor, SessionFolder
-from logs.state import PlannedEntry
+from logs.journal.events import Executed, Labelled, Outcome, Scored, SensorVerdict, Source, Undone
+from logs.journal.file import read_journal
+from logs.journal.state import PlannedEntry
+from logs.record.annotation_files import read_annotations
+from logs.session.folder import SessionDescriptor, SessionFolder
+from logs.session.mirror import AnnotationMirror
+from logs.session.mirrored_journal import MirroredJournal
 
 LABEL = Labelled(
     trial_id="t1", take=1, outcome=Outcome.SUCCESS, operator="ann", source=Source.OPERATOR

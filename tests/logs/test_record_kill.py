@@ -9,8 +9,8 @@ from pathlib import Path
 
 import pytest
 
-from logs.salvage import salvage
-from logs.trial_record import read_record
+from logs.record.salvage import salvage
+from logs.record.trial_record import read_record
 
 SCRIPT = Path(__file__).parent / "fixtures" / "sample_trial.py"
 

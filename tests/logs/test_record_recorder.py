@@ -7,13 +7,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from logs import mcap_file
 from logs.errors import RecordWriteError
-from logs.recorder import TrialRecorder
-from logs.records import EventKind, ExitStatus, TrialEvent
-from logs.streams import DepthImage
+from logs.record import mcap_file
+from logs.record.recorder import TrialRecorder
+from logs.record.records import EventKind, ExitStatus, TrialEvent
+from logs.record.streams import DepthImage
+from logs.record.trial_record import read_record
 from logs.trial_folder import PART_NAME, RECORD_NAME
-from logs.trial_record import read_record
 
 
 @pytest.fixture

@@ -5,15 +5,20 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from logs.annotation_files import read_annotations, write_annotation
-from logs.annotations import ALL_LABELS, LabelRecord, ScoreRecord
-from logs.descriptions import GRIPPER_DESCRIPTION, ROBOT_DESCRIPTION, read_gripper, read_robot
 from logs.errors import RecordReadError, RecordWriteError, UnknownFormatError
-from logs.mesh_attachment import OBJECT_MESH, read_mesh
-from logs.recorder import TrialRecorder
-from logs.records import ExitStatus, RegistrationRecord, TrialDescriptor
-from logs.streams import CloudRecord, DepthImage
-from logs.trial_record import TrialRecord, read_record
+from logs.record.annotation_files import read_annotations, write_annotation
+from logs.record.annotations import ALL_LABELS, LabelRecord, ScoreRecord
+from logs.record.descriptions import (
+    GRIPPER_DESCRIPTION,
+    ROBOT_DESCRIPTION,
+    read_gripper,
+    read_robot,
+)
+from logs.record.mesh_attachment import OBJECT_MESH, read_mesh
+from logs.record.recorder import TrialRecorder
+from logs.record.records import ExitStatus, RegistrationRecord, TrialDescriptor
+from logs.record.streams import CloudRecord, DepthImage
+from logs.record.trial_record import TrialRecord, read_record
 from reach.errors import InvalidInputError
 from reach.gripper import ParallelJawGripper
 from reach.objects import GraspObject
@@ -168,7 +173,7 @@ def test_an_annotation_needs_its_folder(made, tmp_path: Path) -> None:
 
 
 def test_a_later_format_is_refused_by_name(made, tmp_path: Path, monkeypatch) -> None:
-    monkeypatch.setattr("logs.encode.FORMAT_VERSION", 99)
+    monkeypatch.setattr("logs.record.encode.FORMAT_VERSION", 99)
     with TrialRecorder(tmp_path / "t") as recorder:
         made.record_trial(recorder, samples=1)
     with pytest.raises(UnknownFormatError, match="record format 99; this release reads 1"):

@@ -6,19 +6,19 @@ from pathlib import Path
 
 import pytest
 
-from logs import events as ev
-from logs.annotation_files import read_annotations
 from logs.errors import JournalDamagedError, SessionLockedError
-from logs.index import list_takes
-from logs.journal import JOURNAL_NAME, read_journal
-from logs.journal_repair import BAD_NAME
-from logs.recorder import TrialRecorder
-from logs.records import ExitStatus, Severity
-from logs.recovery import RecoveryReport, recover_session
-from logs.salvage import TORN_NAME
-from logs.session import SessionFolder
+from logs.journal import events as ev
+from logs.journal.file import JOURNAL_NAME, read_journal
+from logs.journal.repair import BAD_NAME
+from logs.record.annotation_files import read_annotations
+from logs.record.recorder import TrialRecorder
+from logs.record.records import ExitStatus, Severity
+from logs.record.salvage import TORN_NAME
+from logs.record.trial_record import read_record
+from logs.session.folder import SessionFolder
+from logs.session.index import list_takes
+from logs.session.recovery import RecoveryReport, recover_session
 from logs.trial_folder import PART_NAME, RECORD_NAME, annotation_paths, take_folders
-from logs.trial_record import read_record
 
 
 @pytest.fixture
@@ -127,7 +127,7 @@ def test_a_rescue_that_was_killed_is_done_again(
 
     with monkeypatch.context() as patched:
         if moment == "copying":
-            patched.setattr("logs.mcap_file.DurableMcap.finish", die)
+            patched.setattr("logs.record.mcap_file.DurableMcap.finish", die)
         else:
             real = os.rename
 
@@ -136,7 +136,7 @@ def test_a_rescue_that_was_killed_is_done_again(
                     raise Killed
                 real(source, target)
 
-            patched.setattr("logs.salvage.os.rename", rename)
+            patched.setattr("logs.record.salvage.os.rename", rename)
         with pytest.raises(Killed):
             recover_session(session.path)
     assert not (folder / RECORD_NAME).exists()

@@ -11,8 +11,8 @@ import pytest
 
 from collection.cli.replay import replay
 from logs.errors import ViewError
-from logs.session import SessionFolder
-from logs.viewer import LOOPBACK, WebAddress, WebViewer, show_recordings
+from logs.session.folder import SessionFolder
+from logs.view.viewer import LOOPBACK, WebAddress, WebViewer, show_recordings
 
 
 @pytest.fixture(scope="module")
@@ -80,7 +80,7 @@ def get(port: int, path: str) -> tuple[int, bytes]:
 @pytest.mark.timeout(120)
 def test_a_browser_gets_page_program_and_recording(session: SessionFolder) -> None:
     """From this machine alone: every file that the page needs comes from the same server."""
-    from logs.rerun_view import fresh_view
+    from logs.view.trial import fresh_view
 
     take = session.trial_folder(session.descriptor.trials[0].trial_id)
     with WebViewer([fresh_view(take)]) as viewer:
@@ -106,12 +106,12 @@ def _own_address() -> str:
 @pytest.mark.viewer
 @pytest.mark.timeout(120)
 def test_a_taken_port_is_left_alone(session: SessionFolder, monkeypatch) -> None:
-    from logs.rerun_view import fresh_view
+    from logs.view.trial import fresh_view
 
     take = session.trial_folder(session.descriptor.trials[0].trial_id)
     with socket.create_server((LOOPBACK, 0)) as taken:
         port = taken.getsockname()[1]
-        monkeypatch.setattr("logs.viewer.WEB_PORT", port)
+        monkeypatch.setattr("logs.view.viewer.WEB_PORT", port)
         with WebViewer([fresh_view(take)]) as viewer:
             assert viewer.address.page != port
             assert get(viewer.address.page, "/")[0] == 200

@@ -12,11 +12,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from logs.annotation_files import write_annotation
-from logs.annotations import LabelRecord, ScoreRecord
-from logs.recorder import TrialRecorder
-from logs.rerun_view import derive_rrd
-from logs.session_view import write_session_view
+from logs.record.annotation_files import write_annotation
+from logs.record.annotations import LabelRecord, ScoreRecord
+from logs.record.recorder import TrialRecorder
+from logs.view.session import write_session_view
+from logs.view.trial import derive_rrd
 
 pytestmark = [pytest.mark.viewer, pytest.mark.slow, pytest.mark.timeout(180)]
 LAVAPIPE = sorted(Path("/usr/share/vulkan/icd.d").glob("lvp_icd*.json"))
@@ -143,16 +143,16 @@ def test_ghosts_can_be_switched_off(viewer, take: Path, tmp_path: Path, monkeypa
     """By the eye beside `predicted_settling` in the viewer's list, which is what this sets."""
     import rerun.blueprint as rrb
 
-    from logs.view_settling import SETTLING
+    from logs.view.settling import SETTLING
 
     scene = rrb.Spatial3DView
     hidden = {SETTLING: rrb.EntityBehavior(visible=False)}
     monkeypatch.setattr(
-        "logs.blueprint.rrb.Spatial3DView",
+        "logs.view.blueprint.rrb.Spatial3DView",
         lambda **given: scene(**given, overrides=hidden if given["name"] == "scene" else None),
     )
     # The viewer keeps an application's first layout: this one needs an application of its own.
-    monkeypatch.setattr("logs.rerun_view.APPLICATION", "reach-trials without ghosts")
+    monkeypatch.setattr("logs.view.trial.APPLICATION", "reach-trials without ghosts")
     open_file(viewer, derive_rrd(take, tmp_path / "hidden.rrd"))
     view_id = next(v for v in viewer.get_state().views if v.name == "scene").view_id
     viewer.set_time("elapsed", duration=3.2, play_state="paused")

@@ -10,19 +10,19 @@ from types import ModuleType
 import numpy as np
 import pytest
 
-from logs.annotation_files import write_annotation
-from logs.annotations import LabelRecord, ScoreRecord
-from logs.descriptions import robot_attachment
 from logs.errors import RecordReadError, ViewError
-from logs.recorder import TrialRecorder
-from logs.records import ExitStatus
-from logs.rerun_view import derive_rrd, fresh_view, view_path
-from logs.trial_record import read_record
-from logs.view_colors import pressure_colors
-from logs.view_eyes import turned_to_hand
-from logs.view_object import object_track
-from logs.view_text import summary
-from logs.viewer import viewer_program
+from logs.record.annotation_files import write_annotation
+from logs.record.annotations import LabelRecord, ScoreRecord
+from logs.record.descriptions import robot_attachment
+from logs.record.recorder import TrialRecorder
+from logs.record.records import ExitStatus
+from logs.record.trial_record import read_record
+from logs.view.colors import pressure_colors
+from logs.view.eyes import turned_to_hand
+from logs.view.object import object_track
+from logs.view.text import summary
+from logs.view.trial import derive_rrd, fresh_view, view_path
+from logs.view.viewer import viewer_program
 from reach.transforms import exp
 
 
@@ -211,7 +211,7 @@ def test_an_unwritable_place_is_one_clear_error(take: Path) -> None:
 
 def test_a_full_disk_is_refused_before_anything_is_written(take: Path, monkeypatch) -> None:
     usage = shutil.disk_usage(take)._replace(free=10 * 2**20)
-    monkeypatch.setattr("logs.view_file.shutil.disk_usage", lambda folder: usage)
+    monkeypatch.setattr("logs.view.file.shutil.disk_usage", lambda folder: usage)
     with pytest.raises(ViewError, match="10 MB left; is the disk full"):
         derive_rrd(take)
     assert [path for path in take.iterdir() if path.suffix != ".mcap"] == []
@@ -258,7 +258,7 @@ def test_the_pressure_scale_rises_from_violet_to_yellow() -> None:
 
 
 def test_free_text_cannot_break_the_panel(made, tmp_path: Path) -> None:
-    from logs.annotations import Annotations
+    from logs.record.annotations import Annotations
 
     with TrialRecorder(tmp_path) as recorder:
         recorder.start(made.descriptor(made.cube()))

@@ -11,10 +11,10 @@ from pathlib import Path
 import pytest
 
 from logs.errors import NotASessionError, SessionChangedError, SessionExistsError
-from logs.events import Source
-from logs.journal import JOURNAL_NAME, read_journal
-from logs.session import SESSION_NAME, SessionDescriptor, SessionFolder, open_segment
-from logs.state import PlannedEntry, SessionState
+from logs.journal.events import Source
+from logs.journal.file import JOURNAL_NAME, read_journal
+from logs.journal.state import PlannedEntry, SessionState
+from logs.session.folder import SESSION_NAME, SessionDescriptor, SessionFolder, open_segment
 
 SETUP = {"robot": "r1", "camera": "c1", "calibration": "k1", "plan": "p1"}
 
@@ -91,7 +91,7 @@ def test_a_kill_while_creating_leaves_nothing_or_a_session(
     script = """
 import os, signal, sys
 from pathlib import Path
-from logs.session import SessionDescriptor, SessionFolder
+from logs.session.folder import SessionDescriptor, SessionFolder
 base, limit = Path(sys.argv[1]), int(sys.argv[2])
 calls = 0
 def counted(function):

@@ -7,14 +7,14 @@ import numpy as np
 import pytest
 
 from logs.errors import UnknownTrialError, ViewError
-from logs.find_trial import find_take
-from logs.index import list_takes
-from logs.index_table import IndexRow
-from logs.session import SessionFolder
-from logs.session_overview import TIMELINES, judging_model, overview
-from logs.session_text import contents, headline
-from logs.session_view import write_session_view
+from logs.session.find_trial import find_take
+from logs.session.folder import SessionFolder
+from logs.session.index import list_takes
+from logs.session.index_table import IndexRow
 from logs.trial_folder import RECORD_NAME
+from logs.view.session import write_session_view
+from logs.view.session_overview import TIMELINES, judging_model, overview
+from logs.view.session_text import contents, headline
 
 
 def read_view(path: Path) -> tuple[set[str], str]:
@@ -142,7 +142,7 @@ def test_every_step_sets_whatever_any_step_sets(
     from PIL import Image
     from rerun.chunk import RrdReader
 
-    monkeypatch.setattr("logs.session_view.PICTURES", 2)
+    monkeypatch.setattr("logs.view.session.PICTURES", 2)
     steps: dict[str, set[int]] = {}
     sizes = set()
     for chunk in RrdReader(str(write_session_view(session.path, tmp_path / "all.rrd"))).stream():

@@ -6,7 +6,7 @@ import rerun as rr
 import rerun.blueprint as rrb
 from rerun.chunk import RrdReader
 
-from logs.view_file import view_file
+from logs.view.file import view_file
 
 
 def threads() -> int:

@@ -23,11 +23,11 @@ from yumi_emulator.language import Module
 
 from collection.objects import load_object
 from collection.station import find_station_file, load_station
-from logs.events import Held, Labelled, Source, Voided
-from logs.journal import read_journal
-from logs.session import SessionFolder
-from logs.trial_record import TrialRecord, read_record
-from logs.trial_state import TrialState
+from logs.journal.events import Held, Labelled, Source, Voided
+from logs.journal.file import read_journal
+from logs.journal.trial_state import TrialState
+from logs.record.trial_record import TrialRecord, read_record
+from logs.session.folder import SessionFolder
 from reach.symmetry import pose_distance, symmetry
 
 REACH = Path(sys.executable).with_name("reach")

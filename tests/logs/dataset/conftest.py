@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 import trimesh
 
-from logs.dataset import Dataset, StatedPoseError
-from logs.labeled_trial import Execution, Label, LabeledTrial, LeftOut, StoredScore
+from logs.dataset.dataset import Dataset, StatedPoseError
+from logs.dataset.labeled_trial import Execution, Label, LabeledTrial, LeftOut, StoredScore
 from reach.gripper import ParallelJawGripper
 from reach.objects import GraspObject
 from reach.transforms import exp, make_transform, rotation_about

@@ -6,7 +6,7 @@ import pytest
 import typer.testing
 
 from collection.cli.main import main
-from logs.dataset_files import write_dataset
+from logs.dataset.files import write_dataset
 
 
 @pytest.fixture(scope="module")

@@ -17,9 +17,9 @@ import pytest
 import trimesh
 import yaml
 
-from logs.dataset import merge
-from logs.dataset_files import FORMATS, read_dataset, read_manifest, write_dataset
-from logs.dataset_sources import load_labeled
+from logs.dataset.dataset import merge
+from logs.dataset.files import FORMATS, read_dataset, read_manifest, write_dataset
+from logs.dataset.sources import load_labeled
 from logs.errors import DatasetError
 from logs.export.grasps import GraspSummary
 from logs.export.isaac_grasp import isaac_files
@@ -316,7 +316,7 @@ def test_a_whole_experiment_is_written_within_ten_seconds(make_dataset, tmp_path
 KILLED_WRITER = """
 import sys, pickle
 from pathlib import Path
-import logs.dataset_files as files
+import logs.dataset.files as files
 dataset = pickle.load(open(sys.argv[1], "rb"))
 original = Path.write_bytes
 def slow(path, data):

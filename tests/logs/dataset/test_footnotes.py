@@ -2,8 +2,8 @@
 
 from dataclasses import replace
 
+from logs.dataset.labeled_trial import StoredScore
 from logs.export.card import card_bytes
-from logs.labeled_trial import StoredScore
 from logs.report.footnotes import footnotes, shared_with_engine
 
 

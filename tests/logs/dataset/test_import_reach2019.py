@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 import trimesh
 
-from logs.dataset_files import read_dataset, write_dataset
+from logs.dataset.files import read_dataset, write_dataset
+from logs.dataset.from_reach2019 import MassRule, import_reach2019, read_masses
 from logs.errors import DatasetError
-from logs.import_reach2019 import MassRule, import_reach2019, read_masses
 from reach.errors import InvalidMeshError, UnknownNameError
 from reach.transforms import inverse, make_transform, rotation_about
 

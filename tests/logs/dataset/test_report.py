@@ -11,7 +11,7 @@ import pytest
 import trimesh
 from PIL import Image
 
-from logs.labeled_trial import Execution
+from logs.dataset.labeled_trial import Execution
 from logs.report import sections
 from logs.report.agreement import OperatorAgreement
 from logs.report.curves import pooled, precision_recall_svg, reliability_bins, reliability_svg

@@ -6,13 +6,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from logs import events as ev
-from logs.dataset_files import FORMATS, read_dataset, write_dataset
-from logs.dataset_sources import load_labeled
+from logs.dataset.files import FORMATS, read_dataset, write_dataset
+from logs.dataset.from_session import session_dataset
+from logs.dataset.sources import load_labeled
 from logs.errors import DatasetError, NotASessionError, RecordReadError
-from logs.record_facts import read_facts
-from logs.session_dataset import session_dataset
-from logs.trial_record import read_record
+from logs.journal import events as ev
+from logs.record.facts import read_facts
+from logs.record.trial_record import read_record
 
 OPERATOR = {"operator": "ada", "source": ev.Source.OPERATOR}
 

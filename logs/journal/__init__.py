@@ -1,0 +1,1 @@
+"""The journal: what happened in a session, one checksummed line an event."""

@@ -1,0 +1,1 @@
+"""A session's folder: journal, records and index, and how they are brought together again."""

@@ -1,0 +1,1 @@
+"""The Rerun views, derived from records and annotations."""
