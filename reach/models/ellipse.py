@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import ClassVar
 
-from reach.kernels.rivals import judge_ellipse_contacts
+from reach.kernels.ellipse_contact import judge_ellipse_contacts
 from reach.models.wrench_set_model import PatchModel
 
 

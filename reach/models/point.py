@@ -9,7 +9,7 @@ from reach.arrays import FloatArray, positive
 from reach.contact import ContactPatch
 from reach.grasp import Grasp
 from reach.kernels.pads import Pads
-from reach.kernels.rivals import judge_point_contacts
+from reach.kernels.point_contact import judge_point_contacts
 from reach.models.defaults import TORSION
 from reach.models.wrench_set_model import WrenchSetModel
 from reach.scene import Scene
@@ -17,7 +17,11 @@ from reach.scene import Scene
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PointContact(WrenchSetModel):
-    """Soft point contact: where the ray from each pad's origin first meets the part.
+    """Soft point contact: where the ray from each pad's center first meets the part.
+
+    The center is the pad frame's origin. Where the ray passes the part by although the pad touches
+    it, the contact is the point nearest to the ray of what the pad is pressed on, with the normal
+    there (decision 0016); the published model has no answer then.
 
     The contact carries the four-dimensional wrench |f_t| <= mu f_z, |tau_z| <= gamma f_z, with an
     exact friction cone; f_z is at most the closing force. Both jaws must touch.
@@ -33,7 +37,7 @@ class PointContact(WrenchSetModel):
 
     torsion: float = TORSION
     name: ClassVar[str] = "point"
-    version: ClassVar[str] = "1"
+    version: ClassVar[str] = "2"
     kernel = staticmethod(judge_point_contacts)
 
     def __post_init__(self) -> None:

@@ -247,3 +247,38 @@ def test_ellipse_closed_form_on_a_square():
 def test_triangle_contacts_are_a_plain_value():
     contacts = TriangleContacts(np.eye(4)[None], np.ones(1), np.ones(1), np.zeros(1))
     assert len(contacts) == 1
+
+
+def test_a_pad_that_touches_beside_its_center_ray_has_a_point_contact():
+    """Both rays pass 5 mm above the cube, which the lower part of the pads holds."""
+    part = cube(mass=0.003)
+    above = at(z=0.02)
+    assert PointContact(friction=0.5).evaluate(scene_of(part), above).resists
+    # Off to the side the contacts are on the cube's edge, and gravity turns the part about them.
+    sideways = at(y=0.024)
+    with_torsion = PointContact(friction=0.5, torsion=5e-3, margin_cap=1e4)
+    arm = 0.015  # from the cube's side edge to its center
+    margin = with_torsion.evaluate(scene_of(part), sideways).margin
+    limit = 2 * 20.0 * 5e-3 / (0.003 * GRAVITY * arm)
+    assert margin == pytest.approx(limit, rel=0.02)
+    beyond = PointContact(friction=0.5).evaluate(scene_of(part), at(z=0.04))
+    assert beyond.reason is Reason.NO_CONTACT
+
+
+def test_a_point_contact_does_not_sit_on_a_wall_that_faces_the_pad_by_a_hair():
+    """Tilted by a degree, the cube's top faces the jaws a little and lies nearer to their rays."""
+    part = cube(mass=0.003)
+    for degrees in (-1.0, 1.0):
+        turn = transforms.rotation_about((0, 1, 0), np.radians(degrees))
+        verdict = PointContact(friction=0.5).evaluate(scene_of(part), at(z=0.02, rotation=turn))
+        assert verdict.resists
+
+
+def test_point_and_area_contacts_miss_the_same_jaws():
+    rng = np.random.default_rng(4)
+    part = cube()
+    T = np.array([at(*rng.uniform(-0.03, 0.03, 3)).T_object_gripper for _ in range(200)])
+    point = PointContact().evaluate_batch(scene_of(part), T)
+    area = AreaContact().evaluate_batch(scene_of(part), T)
+    np.testing.assert_array_equal(point.missing, area.missing)
+    assert 20 < np.count_nonzero(point.missing) < 180
