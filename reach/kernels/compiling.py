@@ -7,30 +7,24 @@ an outdated caller behind.
 
 from __future__ import annotations
 
-import hashlib
 import logging
 import os
-import threading
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+import time
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any, TypeVar
 
 import numba
 from numba import config
 
+from reach.sources import source_digest
+
 LOGGER = logging.getLogger(__name__)
-NOTICE_AFTER = 1.5
-"""A first call longer than this is compiling, not loading from the cache [s]."""
+NOTICE = "compiling the contact kernels, once per installation: about a minute"
+SILENCE = 600.0
+"""Processes that compile within this time of the first one say nothing of it [s]."""
 
 Function = TypeVar("Function", bound=Callable[..., Any])
-
-
-def _digest(folder: Path) -> str:
-    digest = hashlib.sha256(numba.__version__.encode())
-    for source in sorted(folder.glob("*.py")):
-        digest.update(source.read_bytes())
-    return digest.hexdigest()[:16]
 
 
 def _cache_folder() -> str:
@@ -42,7 +36,7 @@ def _cache_folder() -> str:
         base = here / "__pycache__"
     else:
         base = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "reach-trials"
-    return str(base / f"kernels-{_digest(here)}")
+    return str(base / f"kernels-{numba.__version__}-{source_digest(here)}")
 
 
 _FOLDER = _cache_folder()
@@ -69,31 +63,38 @@ def compiled_reductions(function: Function) -> Function:
     return _compile(function, fastmath={"reassoc", "contract", "nsz"})
 
 
-_warm: set[str] = set()
+_asked: set[str] = set()
 
 
-@contextmanager
-def announced_compilation(kernel: str) -> Iterator[None]:
-    """Tell the user, in one line of the log, when a kernel's first call turns out to compile it.
+def announce_compilation(kernel: Callable[..., Any]) -> None:
+    """Tell the user, in one line of the log, if a kernel about to be called must be compiled first.
 
-    A warning of the `logging` module reaches standard error unless a program configures it
-    otherwise, and never becomes an exception.
+    The cache on disk decides, not the clock. Of several processes that compile at once, the first
+    one says it. A warning of the `logging` module reaches standard error unless a program
+    configures it otherwise, and never becomes an exception.
 
     Args:
-        kernel: name of the kernel called inside; only its first call in a process is watched.
+        kernel: a compiled function; the cache is looked at once a process.
     """
-    if kernel in _warm:
-        yield
+    name = kernel.__name__
+    if name in _asked:
         return
-    notice = threading.Timer(
-        NOTICE_AFTER,
-        LOGGER.warning,
-        ("compiling the contact kernels, once per installation: about half a minute",),
-    )
-    notice.daemon = True
-    notice.start()
+    _asked.add(name)
+    if not any(Path(_FOLDER).rglob(f"*.{name}-*.nbi")) and _first_to_say():
+        LOGGER.warning(NOTICE)
+
+
+def _first_to_say() -> bool:
+    """Whether no process has announced compilation lately; from now on, this one has."""
+    marker = Path(_FOLDER) / "announced"
     try:
-        yield
-        _warm.add(kernel)
-    finally:
-        notice.cancel()
+        marker.parent.mkdir(parents=True, exist_ok=True)
+        try:
+            marker.touch(exist_ok=False)
+        except FileExistsError:
+            if time.time() - marker.stat().st_mtime < SILENCE:
+                return False
+            marker.touch()  # of a process that was killed, or that compiled other kernels
+    except OSError:
+        pass  # say it too often rather than never
+    return True

@@ -16,7 +16,6 @@ from reach.arrays import FloatArray, IntArray, positive
 from reach.contact import ContactPatch, Verdict, VerdictBatch, batch_of
 from reach.errors import InvalidInputError, InvalidTransformError
 from reach.grasp import DEFAULT_CLOSING_FORCE, Grasp
-from reach.kernels.compiling import announced_compilation
 from reach.kernels.pads import Pads, pads_of
 from reach.kernels.tree import MeshTree, mesh_tree
 from reach.scene import GRAVITY, Scene
@@ -281,8 +280,7 @@ class CompiledModel(ABC):
         )
         tree = mesh_tree(scene.object)
         parts = [slice(i, min(i + CHUNK, count)) for i in range(0, count, CHUNK)]
-        with announced_compilation(self.name):
-            self._run_parts(tree, pads, batch, parts, out, progress)
+        self._run_parts(tree, pads, batch, parts, out, progress)
         return batch_of(out.margin, out.reason, out.missing, out.area)
 
     def _run_parts(

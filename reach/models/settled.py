@@ -23,7 +23,7 @@ import numpy as np
 from reach.arrays import FloatArray, IntArray, positive
 from reach.contact import REASONS, ContactPatch
 from reach.grasp import Grasp
-from reach.kernels.compiling import announced_compilation
+from reach.kernels.compiling import announce_compilation
 from reach.kernels.pads import Pads, pads_of
 from reach.kernels.settle import FEATURES, MOST_POSES, judge_settling
 from reach.kernels.tree import MeshTree, mesh_tree
@@ -151,26 +151,26 @@ class SettledContact(CompiledModel):
         fate, missing = np.zeros(count, np.int64), np.zeros(count, np.int64)
         features = np.zeros((count, FEATURES + jaws))
         lengths = np.zeros(2, np.int64)
-        with announced_compilation(self.name):
-            judge_settling(
-                tree,
-                pads,
-                T,
-                np.array(batch.gravity_object[part]),
-                np.array(batch.com_object[part]),
-                np.array(batch.force[part]),
-                np.array(batch.friction[part]),
-                float(self.stiffness),
-                float(self.margin_cap),
-                TORQUE_LENGTH,
-                margin,
-                fate,
-                missing,
-                area,
-                features,
-                poses,
-                lengths,
-            )
+        announce_compilation(judge_settling)
+        judge_settling(
+            tree,
+            pads,
+            T,
+            np.array(batch.gravity_object[part]),
+            np.array(batch.com_object[part]),
+            np.array(batch.force[part]),
+            np.array(batch.friction[part]),
+            float(self.stiffness),
+            float(self.margin_cap),
+            TORQUE_LENGTH,
+            margin,
+            fate,
+            missing,
+            area,
+            features,
+            poses,
+            lengths,
+        )
         return Settled(
             margin, fate, missing, area, features, poses[: lengths[1]], int(lengths[0]) - 1
         )

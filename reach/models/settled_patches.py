@@ -7,7 +7,7 @@ import numpy as np
 from reach.arrays import FloatArray, frozen
 from reach.contact import ContactPatch
 from reach.grasp import Grasp
-from reach.kernels.compiling import announced_compilation
+from reach.kernels.compiling import announce_compilation
 from reach.kernels.pads import pads_of
 from reach.kernels.tree import mesh_tree
 from reach.kernels.verdict import find_patch, make_workspace
@@ -29,10 +29,10 @@ def settled_patches(scene: Scene, grasp: Grasp, depths: FloatArray) -> tuple[Con
         T_object_pad = grasp.T_object_gripper @ pads.T_gripper_pad[jaw]
         if depth <= 0.0:
             continue
-        with announced_compilation("patch"):
-            count, high, space = find_patch(
-                mesh_tree(scene.object), pads, jaw, T_object_pad, depth, make_workspace(1)
-            )
+        announce_compilation(find_patch)
+        count, high, space = find_patch(
+            mesh_tree(scene.object), pads, jaw, T_object_pad, depth, make_workspace(1)
+        )
         if count:
             found.append(
                 _described(

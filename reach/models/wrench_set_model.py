@@ -10,6 +10,7 @@ from typing import ClassVar
 from reach.arrays import FloatArray, positive
 from reach.contact import ContactPatch
 from reach.grasp import Grasp
+from reach.kernels.compiling import announce_compilation
 from reach.kernels.pads import Pads
 from reach.kernels.tree import MeshTree
 from reach.models.base import (
@@ -57,6 +58,7 @@ class WrenchSetModel(CompiledModel):
     def _judge(
         self, tree: MeshTree, pads: Pads, batch: BatchInput, part: slice, out: BatchOutput
     ) -> None:
+        announce_compilation(self.kernel)
         self.kernel(
             tree,
             pads,

@@ -1,7 +1,5 @@
 """Nonsense is refused with a typed error that names the value: never a silent False."""
 
-import logging
-
 import numpy as np
 import pytest
 import trimesh
@@ -16,7 +14,6 @@ from reach import (
     Scene,
 )
 from reach.errors import InvalidInputError, InvalidMeshError, InvalidTransformError
-from reach.kernels import compiling
 from reach.models.reference import ReferenceAreaContact
 
 MODELS = [AreaContact, EllipseContact, PointContact, ReferenceAreaContact]
@@ -103,21 +100,6 @@ def test_a_file_of_triangles_without_area_is_refused(tmp_path):
     line.export(path)
     with pytest.raises(InvalidMeshError, match="line.stl.* only triangles without area"):
         GraspObject.load(path, mass=0.01)
-
-
-def test_first_slow_call_is_announced_once(monkeypatch, caplog):
-    """In the log, not as a Python warning, so that `-W error` does not break the first use."""
-    monkeypatch.setattr(compiling, "NOTICE_AFTER", 0.0)
-    monkeypatch.setattr(compiling, "_warm", set())
-    with caplog.at_level(logging.WARNING, logger=compiling.__name__):
-        with compiling.announced_compilation("probe"):
-            for thread in compiling.threading.enumerate():
-                if isinstance(thread, compiling.threading.Timer):
-                    thread.join(10)
-        with compiling.announced_compilation("probe"):
-            pass
-    messages = [r for r in caplog.records if "compiling" in r.message]
-    assert len(messages) == 1
 
 
 @pytest.mark.parametrize("model", [AreaContact, EllipseContact, PointContact])
