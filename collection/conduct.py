@@ -6,7 +6,7 @@ import json
 import sys
 from collections.abc import Mapping
 from contextlib import ExitStack
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
@@ -173,7 +173,7 @@ def _reopen(asked: Conduct) -> tuple[SessionFolder, Setup, Station]:
     station = _load(options)
     same_station(station, setup, asked.out)
     _check_operator(options, station, asked.sitting)
-    return folder, Setup(options, station.text, setup.objects, setup.plan), station
+    return folder, replace(setup, options=options, station_text=station.text), station
 
 
 def _load(options: SessionOptions) -> Station:
