@@ -15,7 +15,9 @@ from registration.errors import PictureError
 from registration.frame import DepthFrame
 from registration.result import Registration
 
-CHOSEN, RIVAL = (0.1, 0.8, 0.2), (0.95, 0.2, 0.1)
+CHOSEN = "#1acc33"
+RIVALS = ("#f2331a", "#3d7dff", "#ff9e1a", "#c44dff", "#00b8b8")
+"""Colors of rivals in turn, in the order in which the operator is asked about them."""
 MARGIN = 60
 """Pixels shown around the part."""
 SUFFIXES = (".png", ".jpg", ".svg", ".pdf")
@@ -46,7 +48,9 @@ def check_picture(path: str | Path) -> Path:
 def save_picture(
     path: str | Path, obj: GraspObject, frame: DepthFrame, registration: Registration
 ) -> None:
-    """Draw the depth image with the chosen pose's outline (green) and those of rivals not ruled out (red).
+    """Draw the depth image with the chosen pose's outline (green) and its rivals'.
+
+    Rivals that are ruled out are left out; the others are numbered from 2, the chosen pose is 1.
 
     Raises:
         PictureError: unknown kind of picture, or the file cannot be written.
@@ -71,9 +75,11 @@ def save_picture(
         part = frame.depth[top:bottom, left:right] * 1e3
         image = axes.imshow(part, cmap="gray_r", extent=(left, right, bottom, top))
         figure.colorbar(image, ax=axes, label="depth [mm]")
-        for outline in rivals:
-            _outline(axes, outline, RIVAL, "--")
-        _outline(axes, shown, CHOSEN, "-")
+        for number, outline in enumerate(rivals, start=2):
+            _outline(axes, outline, RIVALS[(number - 2) % len(RIVALS)], "--", f"pose {number}")
+        _outline(axes, shown, CHOSEN, "-", "pose 1")
+        if rivals:
+            axes.legend(loc="upper right", fontsize=9)
         axes.set_xlim(left, right)
         axes.set_ylim(bottom, top)
         axes.set_title(_title(obj, registration), fontsize=9)
@@ -85,9 +91,10 @@ def save_picture(
             raise PictureError(f"cannot write {str(path)!r}: {error}") from error
 
 
-def _outline(axes: Any, mask: BoolArray, color: tuple[float, float, float], style: str) -> None:
+def _outline(axes: Any, mask: BoolArray, color: str, style: str, name: str) -> None:
     if mask.any() and not mask.all():
         axes.contour(mask.astype(float), [0.5], colors=[color], linestyles=style, linewidths=1.2)
+    axes.plot([], [], color=color, linestyle=style, label=name)
 
 
 def _window(mask: BoolArray) -> tuple[int, int, int, int]:
