@@ -90,6 +90,8 @@ def push(
         gain = gain * CALMER if q[2] * last < 0.0 else min(1.0, gain * LIVELIER)
         last = q[2]
         size = np.sqrt(q[0] * q[0] + q[1] * q[1] + q[2] * q[2])
+        if not size > 0.0:  # what the pad touches is too small, or too steep, to be pressed
+            break
         length = min(left, LONGEST_PUSH / size)
         twist = np.zeros(6)
         for i in range(6):
@@ -147,7 +149,8 @@ def pushed_twist(
         T_frame_pad: pose of the pad, origin at the center of mass, shape (4, 4).
         hand: what does not change.
         gyration: radius [m].
-        q: receives slide across, slide along, and yaw times the radius, shape (3,).
+        q: receives slide across, slide along, and yaw times the radius, shape (3,); zeros if the
+            pad does not press.
         gain: part of the rotation to take.
     """
     n, c = np.zeros(3), np.empty(3)
@@ -170,6 +173,9 @@ def pushed_twist(
         ratio = sticking  # wedged between friction and its lever: it can only stick
     q[0], q[1], q[2] = n[0] + ratio, n[1], gain * (n[2] + ratio * lever)
     travel = max(n[0] * q[0] + n[1] * q[1] + n[2] * q[2], 0.1 * n[1] * n[1])
+    if not travel > 0.0:
+        q[:] = 0.0
+        return
     for i in range(3):
         q[i] /= travel
 

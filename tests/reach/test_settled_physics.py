@@ -9,7 +9,7 @@ from reach.contact import Reason
 from reach.gripper import Jaw
 from reach.kernels.pads import pads_of
 from reach.kernels.settle_motion import motions_on_table
-from reach.kernels.settle_push import gyration_about, push, spread_about
+from reach.kernels.settle_push import gyration_about, push, pushed_twist, spread_about
 from reach.kernels.settle_room import Hand, make_room
 from reach.kernels.tree import mesh_tree
 from reach.models.settled import FOUNDATION_STIFFNESS
@@ -256,3 +256,11 @@ def test_without_friction_the_potential_never_rises_while_settling(case):
     drop = values[0] - values[-1]
     assert drop > 1e-3
     assert np.diff(values).max() < 2e-3 * drop
+
+
+def test_a_pad_that_presses_on_nothing_pushes_nothing():
+    motions = motions_on_table(np.array([0.0, 0.0, 1.0]), np.array([1.0, 0.0, 0.0]))
+    hand = Hand(np.zeros(3), 0.2, 0.4, FOUNDATION_STIFFNESS, 0.03)
+    motion = np.full(3, np.nan)
+    pushed_twist(motions, np.zeros(6), np.zeros(3), np.eye(4), hand, 0.01, motion, 1.0)
+    np.testing.assert_array_equal(motion, 0.0)
