@@ -8,7 +8,6 @@ from typing import Any
 import numpy as np
 
 from reach import GraspObject
-from reach.arrays import IntArray
 
 
 def part(name: str) -> GraspObject:
@@ -19,14 +18,7 @@ def part(name: str) -> GraspObject:
 def as_part(name: str, solid: Any) -> GraspObject:
     mesh = solid.to_mesh()
     vertices = np.asarray(mesh.vert_properties[:, :3], dtype=float) * 1e-3
-    return GraspObject(name, vertices, _in_order(np.asarray(mesh.tri_verts)), mass=0.03)
-
-
-def _in_order(faces: IntArray) -> IntArray:
-    """The same triangles in one order: a hull that is found in parallel lists them by chance."""
-    start = np.argmin(faces, axis=1)
-    turned = faces[np.arange(len(faces))[:, None], (start[:, None] + np.arange(3)) % 3]
-    return turned[np.lexsort(turned.T[::-1])]
+    return GraspObject(name, vertices, np.asarray(mesh.tri_verts), mass=0.03)
 
 
 def _box(size: Sequence[float], at: Sequence[float] = (0, 0, 0)) -> Any:
