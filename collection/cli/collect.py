@@ -71,7 +71,8 @@ def collect(
 
         reach collect --resume --out S
     """
-    from collection.conduct import Conduct, conduct, show_plan
+    from collection.conduct import conduct, show_plan
+    from collection.opening import Conduct
     from collection.options import Sitting
 
     chosen = {
