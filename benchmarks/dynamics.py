@@ -20,7 +20,7 @@ import trimesh
 
 from collection.objects import load_object
 from collection.robots.motion import execute_grasp
-from collection.station import load_station
+from collection.station.station import load_station
 from reach import Grasp, GraspObject, ParallelJawGripper, Scene
 from reach.models.dynamic import make_dynamic
 from reach.stable_poses import stable_poses

@@ -12,16 +12,16 @@ from typing import TYPE_CHECKING, Literal
 from rich.console import Console
 
 from collection.errors import OptionsError
-from collection.opening import Conduct, checked, create_session, reopen_session
-from collection.options import Sitting
-from collection.setup import Setup, fingerprints, make_setup
+from collection.session.opening import Conduct, checked, create_session, reopen_session
+from collection.session.options import Sitting
+from collection.session.setup import Setup, fingerprints, make_setup
 from logs.journal.events import Source
 from logs.journal.state import SessionState
 from logs.session.folder import SessionFolder, open_segment
 from reach.errors import ReachError
 
 if TYPE_CHECKING:
-    from collection.station import Station
+    from collection.station.station import Station
     from labeling.controller import SessionController
     from logs.session.mirrored_journal import MirroredJournal
 
@@ -47,7 +47,7 @@ def show_plan(asked: Conduct) -> None:
     Raises:
         ReachError: bad input, as if the session were to run.
     """
-    from collection.plan_table import pose_table, trial_table
+    from collection.plan.table import pose_table, trial_table
 
     if asked.resume:
         raise OptionsError(
@@ -69,7 +69,7 @@ def show_plan(asked: Conduct) -> None:
 def _run(
     asked: Conduct, folder: SessionFolder, setup: Setup, station: Station, terminal: Console
 ) -> None:
-    from collection.ending import stop_station
+    from collection.session.ending import stop_station
     from labeling.controller import SessionController
     from logs.disk import trials_left
     from logs.session.mirror import AnnotationMirror
@@ -124,12 +124,12 @@ def _lead(
     terminal: Console,
 ) -> None:
     """Bring loop, operator, annotator and progress together, until the session ends."""
-    from collection.annotator import Annotator
-    from collection.ending import ending_on_signals
-    from collection.operators import WebConsole, simulated_operator
-    from collection.progress import SessionProgress
-    from collection.session import Session
-    from collection.terminal_operator import TerminalOperator
+    from collection.scoring.annotator import Annotator
+    from collection.session.ending import ending_on_signals
+    from collection.session.operators import WebConsole, simulated_operator
+    from collection.session.progress import SessionProgress
+    from collection.session.session import Session
+    from collection.session.terminal_operator import TerminalOperator
     from collection.trial import TrialContext
 
     options, described = setup.options, folder.descriptor
@@ -183,7 +183,7 @@ def _lead(
 
 
 def _sum_up(asked: Conduct, folder: SessionFolder, terminal: Console) -> None:
-    from collection.summary import summarize, summary_table
+    from collection.session.summary import summarize, summary_table
 
     state = folder.read_state()
     rows = summarize(state)
@@ -211,7 +211,7 @@ def _write_report(asked: Conduct, folder: SessionFolder, terminal: Console) -> P
     finished = state.closed is not None and state.closed.status == "finished"
     if not (asked.report and finished and state.counts().labelled):
         return None
-    from collection.reporting import write_report
+    from collection.analysis.reporting import write_report
 
     page = folder.path / "report.html"
     if not terminal.is_terminal:

@@ -12,7 +12,7 @@ from reach.arrays import FloatArray
 from reach.transforms import make_transform, rotation_about
 
 if TYPE_CHECKING:
-    from collection.station import Station
+    from collection.station.station import Station
 
 SHIFT, TURN = 2e-3, float(np.radians(2.0))
 """What settling and registration may add to a placement [m], [rad]."""

@@ -9,7 +9,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from collection.plan_records import PlannedGrasp, PlannedPose, PlannedTrial
+from collection.plan.records import PlannedGrasp, PlannedPose, PlannedTrial
 from collection.robots import protocol
 from collection.robots.execution import Execution, Phase
 from logs.record import descriptions

@@ -34,9 +34,9 @@ from registration import register
 from registration.result import Registration
 
 if TYPE_CHECKING:
-    from collection.plan_records import Plan, PlannedGrasp, PlannedPose, PlannedTrial
+    from collection.plan.records import Plan, PlannedGrasp, PlannedPose, PlannedTrial
     from collection.robots.protocol import Arm
-    from collection.station import Station
+    from collection.station.station import Station
     from labeling.take import Take
     from reach.objects import GraspObject
     from registration.frame import DepthFrame

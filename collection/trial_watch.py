@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collection.robots.execution import PhaseEvent, TraceSample
-from collection.station import Station
+from collection.station.station import Station
 from logs.record.recorder import TrialRecorder
 
 PICTURE_PERIOD_NS = 400_000_000

@@ -6,7 +6,7 @@ for statistics, and every name says that it is the truth.
 
 from __future__ import annotations
 
-from collection.operator_sim import CLEARANCE, SimulatedVerdict
+from collection.cell.operator import CLEARANCE, SimulatedVerdict
 from logs.journal.events import FailureReason, Outcome, TrueOutcome
 from reach.arrays import FloatArray
 from reach.objects import GraspObject

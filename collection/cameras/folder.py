@@ -14,14 +14,14 @@ from typing import TYPE_CHECKING, Literal, Self
 
 from pydantic import BaseModel, ConfigDict, Field, PositiveFloat
 
-from collection.calibration import CameraPose
+from collection.calibration.calibration import CameraPose
 from collection.cameras.frame_files import FrameFileError, read_frame
 from collection.cameras.protocol import CameraState
 from collection.clock import NANOSECONDS, Clock
 from collection.errors import CameraNotConnectedError, CameraTimeoutError
 
 if TYPE_CHECKING:
-    from collection.drivers import BuildContext
+    from collection.station.drivers import BuildContext
     from reach.arrays import FloatArray
     from registration.frame import DepthFrame, Intrinsics
 

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, Literal, Self
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, PositiveFloat
 
-from collection.calibration import CameraPose
+from collection.calibration.calibration import CameraPose
 from collection.cameras.protocol import CameraState
 from collection.clock import Clock
 from collection.errors import (
@@ -21,7 +21,7 @@ from reach.transforms import make_transform
 from registration.frame import DepthFrame, Intrinsics
 
 if TYPE_CHECKING:
-    from collection.drivers import BuildContext
+    from collection.station.drivers import BuildContext
 
 FRAMES_IN_FLIGHT = 2
 """Pairs that may have been exposed before a request although they arrive after it."""

@@ -11,11 +11,11 @@ from collection.cameras.protocol import CameraState
 from collection.cameras.sensor_noise import SENSOR_MODELS, spoil
 from collection.cameras.simulated_color import SimulatedColorCamera
 from collection.cameras.simulated_config import SimulatedCameraConfig
-from collection.drivers import BuildContext
+from collection.cell.faults import FaultKind
+from collection.cell.shared import simulated_cell
+from collection.cell.simulation import Simulation
 from collection.errors import CameraNotConnectedError, CameraTimeoutError
-from collection.faults import FaultKind
-from collection.simulated_cell import simulated_cell
-from collection.simulation import Simulation
+from collection.station.drivers import BuildContext
 from reach.arrays import FloatArray, frozen
 from reach.transforms import exp, make_transform
 from registration.frame import DepthFrame, Intrinsics

@@ -17,7 +17,7 @@ from reach.objects import GraspObject
 from reach.transforms import quat_wxyz_from_rotation
 
 if TYPE_CHECKING:
-    from collection.simulation import Simulation
+    from collection.cell.simulation import Simulation
 
 WIDTH, HEIGHT = 320, 240
 RENDERERS = ("egl", "osmesa")

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 if TYPE_CHECKING:
-    from collection.chessboard import Board
+    from collection.calibration.chessboard import Board
     from reach.arrays import FloatArray
 
 
@@ -51,7 +51,7 @@ def calibrate(
     """
     import json
 
-    from collection.calibrating import calibrate_views, read_views
+    from collection.calibration.procedure import calibrate_views, read_views
 
     wanted = _parse_board(board, square)
     place = folder or out.with_name(out.stem + "-views")
@@ -78,9 +78,9 @@ def calibrate(
 
 def _take(name: str, board: Board, place: Path, count: int, board_at: str) -> None:
     """Take new views with the station's camera, and its arm if that carries the board."""
-    from collection.calibrating import ObservedArm, RawCamera, flat_board, take_views
+    from collection.calibration.procedure import ObservedArm, RawCamera, flat_board, take_views
     from collection.errors import CalibrationError
-    from collection.station import load_station
+    from collection.station.station import load_station
 
     station = load_station(name)
     camera, arm = station.camera, station.arm
@@ -102,7 +102,7 @@ def _wait_for_enter(message: str) -> None:
 
 
 def _parse_board(text: str, square: float) -> Board:
-    from collection.chessboard import Board
+    from collection.calibration.chessboard import Board
     from collection.errors import CalibrationError
 
     columns, _, rows = text.partition("x")

@@ -72,8 +72,8 @@ def collect(
         reach collect --resume --out S
     """
     from collection.conduct import conduct, show_plan
-    from collection.opening import Conduct
-    from collection.options import Sitting
+    from collection.session.opening import Conduct
+    from collection.session.options import Sitting
 
     chosen = {
         "station": station,

@@ -19,7 +19,7 @@ def console(
     - `reach console 'http://127.0.0.1:8000/#token=...'`
     """
     from collection.errors import OptionsError
-    from collection.terminal_operator import has_terminal
+    from collection.session.terminal_operator import has_terminal
     from labeling.terminal_link import TerminalLink, check_link, trusted
 
     verify = trusted(certificate)

@@ -33,7 +33,7 @@ def doctor(
 
         reach doctor --example --station yumi > lab.toml
     """
-    from collection.station import find_station_file
+    from collection.station.station import find_station_file
 
     if example:
         typer.echo(find_station_file(station).read_text(encoding="utf-8"), nl=False)
@@ -41,8 +41,8 @@ def doctor(
     import json
     from dataclasses import asdict
 
-    from collection.checkup import Status, examine
-    from collection.station import load_station
+    from collection.station.checkup import Status, examine
+    from collection.station.station import load_station
 
     loaded = load_station(station)
     checks = []

@@ -60,9 +60,9 @@ def evaluate(
     - `reach evaluate data/physical --models point,reach,reach-robust --json table.json`
     - `reach evaluate sessions/mon sessions/tue --cross-validate --markdown table.md`
     """
+    from collection.analysis.evaluating import chosen_pose_error, evaluation_content, model_names
+    from collection.analysis.reporting import check_targets, write_text
     from collection.cli.evaluation_table import evaluation_table, print_table, progress_bars
-    from collection.evaluating import chosen_pose_error, evaluation_content, model_names
-    from collection.reporting import check_targets, write_text
     from logs.dataset.sources import load_labeled
     from reach.errors import InvalidInputError
     from reach.evaluation.backends import cluster
@@ -138,7 +138,7 @@ def _command(sources: list[Path], **chosen: object) -> str:
 
 
 def _write_plots(result: Evaluation, folder: Path, *, simulated: bool) -> None:
-    from collection.reporting import write_text
+    from collection.analysis.reporting import write_text
     from logs.report.curves import SIMULATED, precision_recall_svg, reliability_svg
 
     folder.mkdir(parents=True, exist_ok=True)

@@ -48,7 +48,7 @@ def label(
     - `reach label sessions/monday --agreement --json`
     - `reach label --practice`
     """
-    from collection.options import Sitting
+    from collection.session.options import Sitting
     from labeling.server import ConsoleServer
     from reach.errors import InvalidInputError
 

@@ -77,7 +77,7 @@ def _print_version(*, asked: bool) -> None:
 
 
 def _version() -> str:
-    from collection.versions import git_commit, package_versions
+    from collection.session.versions import git_commit, package_versions
 
     commit = git_commit()
     release = f"reach-trials {package_versions()['reach-trials']}"

@@ -8,7 +8,7 @@ from typing import Annotated
 
 import typer
 
-from collection.reporting import REPORT_MODELS
+from collection.analysis.reporting import REPORT_MODELS
 
 
 def report(
@@ -39,9 +39,9 @@ def report(
     - `reach report sessions/monday`
     - `reach report data/mon data/tue --out week.html --models point-robust,reach-robust`
     """
+    from collection.analysis.evaluating import model_names
+    from collection.analysis.reporting import check_targets, write_report
     from collection.cli.evaluation_table import progress_bars
-    from collection.evaluating import model_names
-    from collection.reporting import check_targets, write_report
 
     page = out or (sources[0] / "report.html" if len(sources) == 1 else Path("report.html"))
     check_targets([page])

@@ -111,8 +111,8 @@ def _refuse_beside_sessions(**options: object) -> None:
 
 
 def _score_sessions(sessions: Sequence[Path], names: Sequence[str], *, as_json: bool) -> None:
+    from collection.analysis.rescoring import rescore
     from collection.cli.evaluation_table import progress_bars
-    from collection.rescoring import rescore
     from logs.session.folder import SessionFolder
     from reach.models.registry import make_scorer
 

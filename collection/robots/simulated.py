@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collection.drivers import BuildContext
+from collection.cell.shared import simulated_cell
 from collection.robots.planner import ArmPlanner
 from collection.robots.simulated_arm import SimulatedArm
 from collection.robots.simulated_config import SimulatedRobotConfig
 from collection.robots.simulated_controller import SimulatedController
 from collection.robots.simulated_gripper import SimulatedGripper
 from collection.robots.yumi_arm import yumi_arm
-from collection.simulated_cell import simulated_cell
+from collection.station.drivers import BuildContext
 from reach.transforms import make_transform
 
 

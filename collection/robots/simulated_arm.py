@@ -6,12 +6,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from collection.cell.faults import FaultKind, scripted
 from collection.errors import (
     CollisionStopError,
     EmergencyStopError,
     RobotError,
 )
-from collection.faults import FaultKind, scripted
 from collection.robots.planned_arm import PlannedArm
 from collection.robots.planner import ArmPlanner, JointPath
 from collection.robots.protocol import (

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collection.cell.simulation import Simulation
 from collection.clock import NANOSECONDS
 from collection.errors import (
     ConnectionLostError,
@@ -12,7 +13,6 @@ from collection.errors import (
 )
 from collection.robots.protocol import ArmState
 from collection.robots.stop_latch import STOPPED, StopLatch
-from collection.simulation import Simulation
 
 
 class SimulatedController:

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from typing import Self
 
+from collection.cell.faults import FaultKind
 from collection.errors import GripperNotCalibratedError, RobotTimeoutError, StoppedError
-from collection.faults import FaultKind
 from collection.robots.protocol import GripperListener, GripperMotion, GripperSample, GripperState
 from collection.robots.simulated_controller import SimulatedController
 from reach.arrays import positive

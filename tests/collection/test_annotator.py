@@ -12,7 +12,7 @@ from typing import Any
 
 import pytest
 
-from collection.annotator import Annotator
+from collection.scoring.annotator import Annotator
 from logs.trial_folder import RECORD_NAME
 from reach.pose_error import PoseError
 

@@ -10,13 +10,13 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from collection.calibrating import calibrate_views, flat_board, read_views, take_views
-from collection.calibration import read_calibration
+from collection.calibration.calibration import read_calibration
+from collection.calibration.chessboard import Board, board_pose, find_corners, project
+from collection.calibration.hand_eye import View, solve_fixed_board, solve_gripper_board
+from collection.calibration.procedure import calibrate_views, flat_board, read_views, take_views
 from collection.cameras.frame_files import write_frame
-from collection.chessboard import Board, board_pose, find_corners, project
 from collection.cli.main import main
 from collection.errors import CalibrationError
-from collection.hand_eye import View, solve_fixed_board, solve_gripper_board
 from reach.arrays import FloatArray
 from reach.transforms import (
     apply,

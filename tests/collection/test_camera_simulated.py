@@ -12,9 +12,9 @@ import trimesh
 from collection.cameras.cell_view import CellView
 from collection.cameras.sensor_noise import SENSOR_MODELS, depth_edges, spoil
 from collection.cameras.simulated import looking_at
+from collection.cell.faults import Fault, FaultKind
 from collection.errors import CameraNotConnectedError, CameraTimeoutError
-from collection.faults import Fault, FaultKind
-from collection.station import PACKAGED, Station, build_station, load_station, parse_station
+from collection.station.station import PACKAGED, Station, build_station, load_station, parse_station
 from reach.objects import GraspObject
 from reach.stable_poses import StablePose
 from reach.transforms import apply, inverse, make_transform, rotation_angle

@@ -9,10 +9,10 @@ from pathlib import Path
 
 import pytest
 
-from collection.checkup import Check, Status, examine, guarded
 from collection.cli.main import main
 from collection.errors import CameraError
-from collection.station import find_station_file, load_station, parse_station
+from collection.station.checkup import Check, Status, examine, guarded
+from collection.station.station import find_station_file, load_station, parse_station
 
 
 def checks(capsys: pytest.CaptureFixture[str]) -> dict[str, dict[str, str]]:

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from collection.calibration import (
+from collection.calibration.calibration import (
     BoardSection,
     CameraIntrinsics,
     CameraPose,
@@ -18,13 +18,13 @@ from collection.calibration import (
 from collection.cameras.folder import FolderCamera, FolderCameraConfig, build
 from collection.cameras.frame_files import FrameFileError, read_frame, write_frame
 from collection.clock import NANOSECONDS, SimulatedClock
-from collection.drivers import BuildContext
 from collection.errors import (
     CalibrationError,
     CameraNotConnectedError,
     CameraTimeoutError,
     Recovery,
 )
+from collection.station.drivers import BuildContext
 from reach.errors import InvalidInputError
 from reach.transforms import make_transform, rotation_about
 from registration.frame import DepthFrame, Intrinsics

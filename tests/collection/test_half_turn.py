@@ -10,11 +10,11 @@ import pytest
 import trimesh
 
 from collection.errors import RobotError
-from collection.plan_records import PlannedGrasp
+from collection.plan.records import PlannedGrasp
 from collection.record_mapping import execution_record
 from collection.robots.half_turn import held_alike, pads_change_places
 from collection.robots.motion import can_execute, dry_run, execute_grasp
-from collection.station import Station, load_station
+from collection.station.station import Station, load_station
 from reach import AreaContact, Grasp, Scene
 from reach.gripper import Jaw, Pad, ParallelJawGripper
 from reach.objects import GraspObject

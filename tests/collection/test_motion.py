@@ -14,7 +14,7 @@ from collection.robots.execution import Execution, Phase, PhaseEvent
 from collection.robots.motion import can_execute, dry_run, execute_grasp, reachable_grasps
 from collection.robots.motion_settings import MotionSettings
 from collection.robots.waypoints import approach_pose, shake_poses, trial_waypoints
-from collection.station import (
+from collection.station.station import (
     PACKAGED,
     Station,
     build_station,

@@ -7,7 +7,7 @@ import pytest
 
 from collection.placement import SHIFT, TURN, well_placed
 from collection.robots.motion import can_execute
-from collection.station import load_station
+from collection.station.station import load_station
 from reach.transforms import inverse, make_transform, rotation_angle
 
 T_OBJECT_GRIPPER = make_transform(np.diag([1.0, -1.0, -1.0]), (0, 0, 0.160098))

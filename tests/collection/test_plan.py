@@ -8,7 +8,7 @@ import trimesh
 
 from collection.errors import DuplicateNameError, NoGraspError, PlanError
 from collection.objects import load_object
-from collection.plan import Plan, make_plan, repeat_plan
+from collection.plan.plan import Plan, make_plan, repeat_plan
 from collection.sampling import SamplingOptions
 from collection.sampling.over_poses import sample_over_poses
 from reach.gripper import ParallelJawGripper
@@ -47,8 +47,8 @@ def test_every_stretch_of_the_session_holds_every_part_alike(plan):
 
 
 def test_unequal_parts_are_spread_over_the_session():
-    from collection.plan import _ordered_trials
-    from collection.plan_records import PlannedGrasp
+    from collection.plan.plan import _ordered_trials
+    from collection.plan.records import PlannedGrasp
 
     def grasps(name: str, number: int) -> list[PlannedGrasp]:
         return [

@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from collection.coverage import Contact, coverage
 from collection.objects import load_object
 from collection.pictures import PART_COLOR, View, part_picture
-from collection.placing import how_it_lies, placing_picture
-from collection.plan import Plan, make_plan
-from collection.plan_table import pose_table, trial_table
+from collection.plan.coverage import Contact, coverage
+from collection.plan.placing import how_it_lies, placing_picture
+from collection.plan.plan import Plan, make_plan
+from collection.plan.table import pose_table, trial_table
 from collection.sampling import SamplingOptions
 from reach.gripper import ParallelJawGripper
 
@@ -57,7 +57,7 @@ def test_without_jitter_no_pad_misses_and_offsets_are_zero(parts):
 
 
 def test_edges_and_corners_of_a_cube_are_told_from_its_faces(parts):
-    from collection.coverage import _Features
+    from collection.plan.coverage import _Features
 
     features = _Features.of(parts["cube_3cm"])
     assert features.at(np.array([0.015, 0, 0])) is Contact.FACE

@@ -15,7 +15,6 @@ import pytest
 
 from collection.cameras.realsense import FRAMES_IN_FLIGHT, RealSenseConfig, build
 from collection.clock import SimulatedClock
-from collection.drivers import BuildContext
 from collection.errors import (
     CalibrationError,
     CameraNotConnectedError,
@@ -23,6 +22,7 @@ from collection.errors import (
     MissingExtraError,
     Recovery,
 )
+from collection.station.drivers import BuildContext
 
 
 class Frames:

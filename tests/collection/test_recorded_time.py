@@ -6,7 +6,7 @@ from pathlib import Path
 
 from collection.cli.main import main
 from collection.clock import SimulatedClock
-from collection.recorded_time import last_recorded_ns
+from collection.session.recorded_time import last_recorded_ns
 from logs.record.facts import read_facts
 from logs.session.folder import SessionFolder
 

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 import trimesh
 
+from collection.cell.faults import Fault, FaultKind
 from collection.errors import (
     CollisionStopError,
     ConnectionLostError,
@@ -19,10 +20,9 @@ from collection.errors import (
     RobotTimeoutError,
     StoppedError,
 )
-from collection.faults import Fault, FaultKind
 from collection.robots.motion import execute_grasp, recover
 from collection.robots.protocol import Speed
-from collection.station import Station, load_station
+from collection.station.station import Station, load_station
 from reach.objects import GraspObject
 from reach.stable_poses import StablePose
 from reach.transforms import inverse, make_transform

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 import trimesh
 
-from collection.scoring import scene_of
+from collection.scoring.predictions import scene_of
 from logs.errors import RecordReadError
 from logs.record.descriptions import STATION_FILE, gripper_attachment
 from logs.record.mesh_attachment import mesh_attachment

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import trimesh
 
-from collection import scoring
+from collection.scoring import predictions as scoring
 from reach import AreaContact, Grasp, GraspObject, ParallelJawGripper, PoseError, Scene, transforms
 from reach.contact import Verdict
 from reach.models.registry import Score, make_scorer, warm_up

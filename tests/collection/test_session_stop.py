@@ -12,7 +12,7 @@ import pytest
 from collection import trial as trial_module
 from collection.cli.main import main
 from collection.robots.simulated_arm import SimulatedArm
-from collection.session import Session
+from collection.session.session import Session
 from labeling.commands import Actor, Command, CommandKind
 from labeling.controller import SessionController
 from logs.journal.events import Source

@@ -11,7 +11,7 @@ import trimesh
 
 from collection.clock import SimulatedClock, WallClock
 from collection.errors import CameraTimeoutError, StationFileError
-from collection.station import (
+from collection.station.station import (
     PACKAGED,
     build_station,
     example_station,

@@ -9,11 +9,11 @@ import pytest
 
 from collection.errors import StationFileError
 from collection.objects import load_objects
-from collection.options import SessionOptions
-from collection.plan import make_plan
+from collection.plan.plan import make_plan
 from collection.robots.yumi.config import DELIVERED, PASSWORD_VARIABLE, YumiConfig
-from collection.setup import Setup
-from collection.station import PACKAGED, Station, build_station, parse_station
+from collection.session.options import SessionOptions
+from collection.session.setup import Setup
+from collection.station.station import PACKAGED, Station, build_station, parse_station
 from logs.session.folder import SessionFolder
 
 TEXT = (PACKAGED / "yumi.toml").read_text(encoding="utf-8")

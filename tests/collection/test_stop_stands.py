@@ -12,7 +12,7 @@ from collection.errors import CollisionStopError, StoppedError
 from collection.robots.execution import Phase, PhaseEvent, TraceSample
 from collection.robots.motion import execute_grasp, recover
 from collection.robots.protocol import Speed
-from collection.station import Station, load_station
+from collection.station.station import Station, load_station
 from reach.objects import GraspObject
 from reach.stable_poses import StablePose
 from reach.transforms import make_transform

@@ -19,7 +19,7 @@ Refused = Callable[..., str]
 @pytest.fixture
 def refused(capfd: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> Refused:
     """The one line that `reach console` answers with, where there is no terminal."""
-    monkeypatch.setattr("collection.terminal_operator.has_terminal", lambda: False)
+    monkeypatch.setattr("collection.session.terminal_operator.has_terminal", lambda: False)
 
     def run(link: str, *options: str) -> str:
         code = main(["console", link, *options])

@@ -12,10 +12,10 @@ from typing import TYPE_CHECKING
 from collection.robots.yumi.config import YumiConfig
 
 if TYPE_CHECKING:
-    from collection.drivers import BuildContext
     from collection.robots.planner import ArmPlanner
     from collection.robots.yumi.arm import YumiRobotArm
     from collection.robots.yumi.hand import SmartGripper
+    from collection.station.drivers import BuildContext
 
 __all__ = ["YumiConfig", "build"]
 

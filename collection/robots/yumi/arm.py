@@ -31,8 +31,8 @@ from reach.arrays import FloatArray
 from reach.transforms import as_transform, inverse, quat_wxyz_from_rotation
 
 if TYPE_CHECKING:
-    from collection.checkup import Check
     from collection.robots.planner import ArmPlanner
+    from collection.station.checkup import Check
 
 HOLDER = "the YuMi arm"
 TIME_FACTOR, TIME_MARGIN = 3.0, 10.0

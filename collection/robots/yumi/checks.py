@@ -6,7 +6,6 @@ from collections.abc import Callable, Iterator
 
 import numpy as np
 
-from collection.checkup import Check, Status, passed
 from collection.errors import RobotError
 from collection.robots.yumi.diagnosis import not_ready
 from collection.robots.yumi.feedback import MODEL_POSITION, MODEL_ROTATION, Feedback
@@ -14,6 +13,7 @@ from collection.robots.yumi.link import MODULE_FILE, ControllerLink, module_vers
 from collection.robots.yumi.program import TOOL, VERSION
 from collection.robots.yumi.rapid_text import from_rapid
 from collection.robots.yumi.web_services import WebServices
+from collection.station.checkup import Check, Status, passed
 from reach.arrays import FloatArray
 from reach.transforms import inverse, rotation_angle
 

@@ -15,11 +15,11 @@ from yumi_emulator import Arm, Controller, WebServices
 from yumi_emulator.language import Module, parse_module
 
 from collection.clock import SimulatedClock
-from collection.drivers import BuildContext
 from collection.robots.yumi import YumiConfig, build
 from collection.robots.yumi.arm import YumiRobotArm
 from collection.robots.yumi.hand import SmartGripper
-from collection.station import StationConfig, read_station
+from collection.station.drivers import BuildContext
+from collection.station.station import StationConfig, read_station
 
 
 @pytest.fixture(scope="session")

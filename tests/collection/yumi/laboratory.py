@@ -22,11 +22,11 @@ from yumi_emulator.language import Module
 
 from collection.cameras.frame_files import write_frame
 from collection.objects import load_object
-from collection.plan_records import Plan
+from collection.plan.records import Plan
 from collection.robots.half_turn import held_alike
 from collection.robots.motion import can_execute
 from collection.robots.yumi.messages import Command
-from collection.station import Station
+from collection.station.station import Station
 
 LAPSE = 20.0
 """Seconds of the controller to one of the wall clock: its motions are long."""

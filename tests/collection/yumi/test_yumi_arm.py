@@ -307,8 +307,8 @@ def test_the_left_arm_is_the_left_one(
 ) -> None:
     from pathlib import Path as FilePath
 
-    from collection.drivers import BuildContext
     from collection.robots.yumi import build
+    from collection.station.drivers import BuildContext
 
     config = YumiConfig(driver="yumi", address=services.address, side="left")
     arm, _ = build(config, BuildContext(station, clock, 0, FilePath.cwd()))

@@ -9,18 +9,24 @@ import numpy as np
 import pytest
 from yumi_emulator import Controller, WebServices
 
-from collection.calibrating import ObservedArm
-from collection.checkup import Check, Status, examine
+from collection.calibration.procedure import ObservedArm
 from collection.clock import SimulatedClock
-from collection.drivers import BuildContext
 from collection.robots.yumi import YumiConfig, build
-from collection.station import Station, StationConfig, build_station, parse_station, read_station
+from collection.station.checkup import Check, Status, examine
+from collection.station.drivers import BuildContext
+from collection.station.station import (
+    Station,
+    StationConfig,
+    build_station,
+    parse_station,
+    read_station,
+)
 
 
 @pytest.fixture
 def whole_station(services: WebServices, clock: SimulatedClock, tmp_path: Path) -> Station:
     """The packaged real station, its address the emulator's, its clock the test's."""
-    from collection.station import find_station_file
+    from collection.station.station import find_station_file
 
     (tmp_path / "frames").mkdir()
     text = find_station_file("yumi").read_text().replace("192.168.125.1", services.address)

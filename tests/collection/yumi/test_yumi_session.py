@@ -22,7 +22,7 @@ from yumi_emulator import WebServices
 from yumi_emulator.language import Module
 
 from collection.objects import load_object
-from collection.station import find_station_file, load_station
+from collection.station.station import find_station_file, load_station
 from logs.journal.events import Held, Labelled, Source, Voided
 from logs.journal.file import read_journal
 from logs.journal.trial_state import TrialState

@@ -18,7 +18,7 @@ from collection.robots.yumi import YumiConfig
 from collection.robots.yumi.arm import YumiRobotArm
 from collection.robots.yumi.hand import SmartGripper
 from collection.robots.yumi.link import ControllerLink
-from collection.station import StationConfig
+from collection.station.station import StationConfig
 from reach.transforms import make_transform, rotation_about
 
 GRASP = make_transform(

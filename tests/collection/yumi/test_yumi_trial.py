@@ -13,7 +13,7 @@ from collection.robots.motion import dry_run, execute_grasp, recover
 from collection.robots.yumi import YumiConfig
 from collection.robots.yumi.arm import YumiRobotArm
 from collection.robots.yumi.hand import SmartGripper
-from collection.station import StationConfig
+from collection.station.station import StationConfig
 from reach.arrays import FloatArray
 from reach.transforms import make_transform, rotation_about
 

@@ -4,7 +4,7 @@ import json
 
 import pytest
 
-from collection.evaluating import evaluation_content
+from collection.analysis.evaluating import evaluation_content
 from logs.report.table_page import table_page
 from reach.evaluation.compare import compare, scorers_of
 from reach.evaluation.protocol import run_protocol

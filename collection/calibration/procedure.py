@@ -8,17 +8,17 @@ from typing import Literal, Protocol, runtime_checkable
 
 import numpy as np
 
-from collection.calibration import (
+from collection.calibration.calibration import (
     BoardSection,
     CameraIntrinsics,
     HandEyeCalibration,
     Row,
     ViewResiduals,
 )
+from collection.calibration.chessboard import Board, find_corners
+from collection.calibration.hand_eye import HandEye, View, solve_fixed_board, solve_gripper_board
 from collection.cameras.frame_files import read_frame, read_gripper_pose, write_frame
-from collection.chessboard import Board, find_corners
 from collection.errors import CalibrationError
-from collection.hand_eye import HandEye, View, solve_fixed_board, solve_gripper_board
 from reach.arrays import FloatArray
 from reach.transforms import make_transform, rotation_about
 from registration.frame import DepthFrame, Intrinsics

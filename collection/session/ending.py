@@ -8,7 +8,7 @@ from contextlib import ExitStack, contextmanager, suppress
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from collection.station import Station
+    from collection.station.station import Station
     from labeling.controller import SessionController
 
 

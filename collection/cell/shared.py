@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
+from collection.cell.simulation import Simulation
 from collection.clock import SimulatedClock
-from collection.drivers import BuildContext
 from collection.errors import StationFileError
-from collection.simulation import Simulation
+from collection.station.drivers import BuildContext
 
 
 def simulated_cell(context: BuildContext) -> Simulation:

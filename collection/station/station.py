@@ -9,23 +9,23 @@ from typing import TYPE_CHECKING, Any, Literal, Self
 
 from pydantic import BaseModel, ConfigDict, Field, InstanceOf
 
+from collection.cell.settings import SimulationSettings
 from collection.clock import Clock, SimulatedClock, WallClock
-from collection.drivers import (
+from collection.errors import CalibrationError
+from collection.robots.motion_settings import MotionSettings
+from collection.station.drivers import (
     CAMERA_DRIVERS,
     ROBOT_DRIVERS,
     BuildContext,
     find_driver,
 )
-from collection.errors import CalibrationError
-from collection.robots.motion_settings import MotionSettings
-from collection.simulation_settings import SimulationSettings
-from collection.station_file import Sections, read_sections, validated, without_secrets
+from collection.station.file import Sections, read_sections, validated, without_secrets
 from reach.errors import UnknownNameError
 
 if TYPE_CHECKING:
     from collection.cameras.protocol import ColorCamera, DepthCamera
+    from collection.cell.simulation import Simulation, Workspace
     from collection.robots.protocol import Arm, GripperDevice
-    from collection.simulation import Simulation, Workspace
     from reach.gripper import ParallelJawGripper
     from reach.pose_error import PoseError
 
@@ -128,7 +128,7 @@ class StationConfig(_Section):
 
     def workspace_area(self) -> Workspace:
         """The workspace as the simulated cell needs it."""
-        from collection.simulation import Workspace
+        from collection.cell.simulation import Workspace
 
         return Workspace(self.workspace.center, self.workspace.size, self.workspace.table_height)
 
@@ -280,7 +280,7 @@ def build_station(config: StationConfig, text: str, folder: Path, seed: int) -> 
 
 def _known_pose_error(config: StationConfig, camera: DepthCamera) -> PoseErrorConfig:
     """What is known of a station's errors: as stated, else the calibration's residuals, else none."""
-    from collection.calibration import calibration_of
+    from collection.calibration.calibration import calibration_of
 
     if "pose_error" in config.model_fields_set or config.simulation is not None:
         return config.pose_error

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pydantic import BaseModel, ConfigDict, Field, field_validator
 
-from collection.faults import FaultKind
+from collection.cell.faults import FaultKind
 
 Range = tuple[float, float]
 

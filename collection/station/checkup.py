@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Protocol, runtime_checkable
 from reach.errors import ReachError
 
 if TYPE_CHECKING:
-    from collection.station import Station
+    from collection.station.station import Station
 
 LARGE_REPROJECTION = 0.5
 """A good chessboard calibration stays well below this [pixel]."""
@@ -113,7 +113,7 @@ def _camera(station: Station, *, capture: bool) -> Iterator[Check]:
 
 
 def _calibration(station: Station) -> Iterator[Check]:
-    from collection.calibration import calibration_of
+    from collection.calibration.calibration import calibration_of
 
     found = calibration_of(station.camera)
     if found is None:

@@ -26,7 +26,7 @@ from logs.trial_folder import VIEW_NAME
 from reach.sources import source_digest
 
 if TYPE_CHECKING:
-    from collection.scoring import Prediction
+    from collection.scoring.predictions import Prediction
     from labeling.controller import SessionController
     from logs.journal.state import TakeState
     from logs.session.folder import SessionFolder
@@ -212,7 +212,7 @@ def _end_with_session(lifeline: Connection, quiet: bool) -> None:
 def _score(folder: Path, models: Sequence[str], pose_error: PoseError) -> list[Prediction]:
     if not models:  # only its view is missing
         return []
-    from collection.scoring import score_take
+    from collection.scoring.predictions import score_take
 
     return score_take(folder, models, pose_error)
 

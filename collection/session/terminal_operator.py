@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING
 from labeling.commands import Actor, Command, CommandKind
 
 if TYPE_CHECKING:
-    from collection.progress import SessionProgress
+    from collection.session.progress import SessionProgress
     from labeling.controller import SessionController
 
 LOOK_PERIOD = 0.2

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections import Counter
 
 from collection.objects.mesh_file import mesh_notes
-from collection.plan_records import PlannedGrasp, PlannedObject, PlannedPose
+from collection.plan.records import PlannedGrasp, PlannedObject, PlannedPose
 from collection.sampling.options import SamplingOptions
 from collection.sampling.over_poses import PoseSamples, sample_over_poses
 from collection.sampling.sampler import Reachable

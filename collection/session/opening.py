@@ -10,15 +10,15 @@ from typing import TYPE_CHECKING, Any
 from pydantic import ValidationError
 
 from collection.errors import OptionsError
-from collection.options import SessionOptions, Sitting
-from collection.setup import Setup, make_setup, read_setup, same_station
+from collection.session.options import SessionOptions, Sitting
+from collection.session.setup import Setup, make_setup, read_setup, same_station
 from logs.session.folder import ACCEPTABLE_CHANGES, SessionFolder
 from reach.errors import UnknownNameError
 
 if TYPE_CHECKING:
     from rich.console import Console
 
-    from collection.station import Station
+    from collection.station.station import Station
 
 
 @dataclass(frozen=True, slots=True)
@@ -111,13 +111,13 @@ def reopen_session(asked: Conduct) -> tuple[SessionFolder, Setup, Station]:
 
 
 def _load(options: SessionOptions) -> Station:
-    from collection.station import load_station
+    from collection.station.station import load_station
 
     return load_station(options.station, seed=options.seed)
 
 
 def _check_operator(options: SessionOptions, station: Station, sitting: Sitting) -> None:
-    from collection.terminal_operator import has_terminal
+    from collection.session.terminal_operator import has_terminal
 
     if options.operator == "auto" and station.simulation is None:
         raise OptionsError(

@@ -15,7 +15,7 @@ from itertools import combinations
 import numpy as np
 from scipy.optimize import least_squares
 
-from collection.chessboard import Board, board_pose, project
+from collection.calibration.chessboard import Board, board_pose, project
 from collection.errors import CalibrationError
 from reach.arrays import FloatArray, frozen
 from reach.transforms import (

@@ -13,8 +13,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from collection.errors import DuplicateNameError, PlanError
-from collection.plan_object import plan_object
-from collection.plan_records import Plan, PlannedGrasp, PlannedObject, PlannedTrial
+from collection.plan.one_object import plan_object
+from collection.plan.records import Plan, PlannedGrasp, PlannedObject, PlannedTrial
 from collection.sampling import Reachable, SamplingOptions
 from reach.gripper import ParallelJawGripper
 from reach.objects import GraspObject

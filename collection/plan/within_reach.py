@@ -15,7 +15,7 @@ from reach.arrays import BoolArray, FloatArray
 from reach.transforms import make_transform, rotation_about
 
 if TYPE_CHECKING:
-    from collection.station import Station
+    from collection.station.station import Station
 
 TURNS = 8
 """Turns of the part about the vertical that are tried, evenly over the circle."""

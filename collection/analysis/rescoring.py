@@ -6,9 +6,9 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from collection.annotator import mirror_score, scored_event
-from collection.scoring import score_take
-from collection.setup import stated_pose_error
+from collection.scoring.annotator import mirror_score, scored_event
+from collection.scoring.predictions import score_take
+from collection.session.setup import stated_pose_error
 from logs.journal.state import SessionState
 from logs.session.folder import SessionFolder
 from logs.session.mirror import AnnotationMirror

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from collection.simulation_settings import SimulationSettings
+from collection.cell.settings import SimulationSettings
 from reach.arrays import FloatArray
 from reach.gripper import ParallelJawGripper
 from reach.objects import GraspObject

@@ -19,7 +19,7 @@ from collection.errors import (
     Recovery,
     StoppedError,
 )
-from collection.recorded_time import last_recorded_ns
+from collection.session.recorded_time import last_recorded_ns
 from collection.trial import TrialContext, run_take
 from labeling.auto import ACTOR
 from labeling.commands import AnswerStatus, Command, CommandKind
@@ -31,7 +31,7 @@ from registration.errors import RegistrationError
 if TYPE_CHECKING:
     from pathlib import Path
 
-    from collection.annotator import Annotator
+    from collection.scoring.annotator import Annotator
     from labeling.controller import SessionController
     from labeling.take import Take
     from logs.journal.state import TrialState

@@ -120,7 +120,7 @@ class Plan(_Record):
         return next(pose for pose in poses if pose.index == grasp.stable_pose)
 
     def to_json(self) -> str:
-        """As text that [from_json][collection.plan_records.Plan.from_json] reads back exactly."""
+        """As text that [from_json][collection.plan.records.Plan.from_json] reads back exactly."""
         return self.model_dump_json()
 
     @classmethod

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 from rich.table import Table
 
-from collection.plan_records import Plan
+from collection.plan.records import Plan
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 def pose_table(plan: Plan, objects: Iterable[GraspObject]) -> Table:
     """Each part's stable poses: how likely, how many grasps, how to place the part."""
-    from collection.placing import how_it_lies
+    from collection.plan.placing import how_it_lies
 
     by_name = {part.name: part for part in objects}
     table = Table(title=f"{len(plan.grasps)} grasps of {len(plan.objects)} objects", box=None)

@@ -10,13 +10,13 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from collection.placing import how_it_lies, placing_picture
+from collection.plan.placing import how_it_lies, placing_picture
 
 if TYPE_CHECKING:
-    from collection.options import Sitting
-    from collection.plan_records import Plan
-    from collection.setup import Setup
-    from collection.station import Station
+    from collection.plan.records import Plan
+    from collection.session.options import Sitting
+    from collection.session.setup import Setup
+    from collection.station.station import Station
     from labeling.controller import SessionController
     from logs.journal.state import TakeState, TrialState
     from logs.session.folder import SessionFolder

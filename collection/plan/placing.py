@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from collection.pictures import View, part_picture, png_bytes
-from collection.plan_records import PlannedPose
+from collection.plan.records import PlannedPose
 from reach.arrays import FloatArray
 from reach.objects import GraspObject
 from reach.transforms import apply

@@ -13,18 +13,18 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from collection.calibration import calibration_of
+from collection.calibration.calibration import calibration_of
 from collection.errors import StationFileError
-from collection.options import SessionOptions
-from collection.plan_records import Plan
-from collection.versions import git_commit, package_versions
+from collection.plan.records import Plan
+from collection.session.options import SessionOptions
+from collection.session.versions import git_commit, package_versions
 from logs.journal.state import PlannedEntry
 from logs.record.mesh_attachment import mesh_attachment, read_mesh
 from logs.session.folder import PLAN_NAME, SessionDescriptor, SessionFolder
 from reach.objects import GraspObject
 
 if TYPE_CHECKING:
-    from collection.station import Station
+    from collection.station.station import Station
     from reach.pose_error import PoseError
 
 OBJECTS = "objects"
@@ -96,8 +96,8 @@ def make_setup(options: SessionOptions, station: Station) -> Setup:
         NoGraspError: a part that the hand cannot hold.
     """
     from collection.objects import load_objects
-    from collection.plan import make_plan
-    from collection.planning_reach import reach_of
+    from collection.plan.plan import make_plan
+    from collection.plan.within_reach import reach_of
     from collection.sampling import SamplingOptions
 
     parts = load_objects(options.objects, options.mesh_unit)
@@ -149,7 +149,7 @@ def resolved_station(station: Station) -> dict[str, Any]:
 
 def stated_pose_error(folder: SessionFolder) -> PoseError:
     """What a session's station stated of calibration and actuation, as the models are told."""
-    from collection.station import PoseErrorConfig
+    from collection.station.station import PoseErrorConfig
 
     station: Any = folder.descriptor.config["station"]
     return PoseErrorConfig.model_validate(station["pose_error"]).total()

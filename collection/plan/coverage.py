@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from pydantic import BaseModel, ConfigDict
 
-from collection.plan_records import PlannedGrasp
+from collection.plan.records import PlannedGrasp
 from collection.sampling.approach import center_of_pads
 from reach.arrays import BoolArray, FloatArray, IntArray
 from reach.gripper import ParallelJawGripper

@@ -12,12 +12,12 @@ from typing import Protocol
 
 import numpy as np
 
+from collection.cell.faults import Fault, FaultKind, FaultSchedule
+from collection.cell.hidden import HiddenDraws, draw_hidden
+from collection.cell.operator import SimulatedVerdict, Watcher
+from collection.cell.settings import SimulationSettings
 from collection.clock import SimulatedClock
 from collection.errors import CollectionError
-from collection.faults import Fault, FaultKind, FaultSchedule
-from collection.hidden import HiddenDraws, draw_hidden
-from collection.operator_sim import SimulatedVerdict, Watcher
-from collection.simulation_settings import SimulationSettings
 from reach.arrays import FloatArray, frozen
 from reach.gripper import ParallelJawGripper
 from reach.objects import GraspObject

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 from reach.errors import InvalidInputError
 
 if TYPE_CHECKING:
-    from collection.coverage import Histogram
+    from collection.plan.coverage import Histogram
     from logs.report.agreement import OperatorAgreement
     from logs.report.coverage import PlanCoverage
     from reach.evaluation.table import Evaluation
@@ -58,7 +58,7 @@ def write_report(
     Raises:
         InvalidInputError: the page cannot be written.
     """
-    from collection.evaluating import chosen_pose_error
+    from collection.analysis.evaluating import chosen_pose_error
     from logs.dataset.sources import load_labeled
     from logs.report.page import build_report
     from reach.evaluation.backends import cluster
@@ -90,8 +90,8 @@ def write_report(
 
 def _covered(sources: Sequence[Path]) -> PlanCoverage | None:
     """What the plans of these sessions cover; None where a source is no session."""
-    from collection.coverage import coverage
-    from collection.setup import read_setup
+    from collection.plan.coverage import coverage
+    from collection.session.setup import read_setup
     from logs.report.coverage import Bars, PlanCoverage
     from logs.session.folder import SESSION_NAME, SessionFolder
     from reach.gripper import ParallelJawGripper

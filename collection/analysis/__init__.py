@@ -1,0 +1,1 @@
+"""What is computed from whole sessions: new scores, evaluations, the report."""

@@ -1,0 +1,1 @@
+"""The simulated cell that simulated arm, hand and camera share."""

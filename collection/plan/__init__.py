@@ -1,0 +1,1 @@
+"""The plan of an experiment: grasps, repeats and order, as values and as files."""

@@ -1,0 +1,1 @@
+"""Predictions for recorded takes, made beside the session."""

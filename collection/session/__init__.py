@@ -1,0 +1,1 @@
+"""A session: opened or resumed, led trial after trial, ended, summed up."""

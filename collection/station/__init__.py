@@ -1,0 +1,1 @@
+"""The station: what stands in the laboratory, as one file names it."""
