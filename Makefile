@@ -13,8 +13,8 @@ help: ## list the commands
 install: $(VENV)/.installed ## make the environment in .venv
 
 $(VENV)/.installed: pyproject.toml constraints.txt
-	@./tests/install-system-packages runtime
-	@test -x $(BIN)/python || $(PYTHON) -m venv $(VENV)
+	@PYTHON=$(PYTHON) ./tests/install-system-packages runtime
+	@$(BIN)/python -m pip --version >/dev/null 2>&1 || $(PYTHON) -m venv $(VENV)
 	@$(BIN)/python -m pip install --quiet --disable-pip-version-check 'uv>=0.5'
 	@$(BIN)/uv pip install --quiet --python $(BIN)/python --constraint constraints.txt --editable '.[dev]'
 	@touch $@
