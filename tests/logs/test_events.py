@@ -66,6 +66,11 @@ def test_the_examples_cover_every_kind() -> None:
     assert {type(event) for event in EXAMPLES} == set(get_args(AnyEvent))
 
 
+def test_one_module_names_every_kind_and_word() -> None:
+    assert set(ev.__all__) >= {kind.__name__ for kind in get_args(AnyEvent)}
+    assert all(hasattr(ev, name) for name in ev.__all__)
+
+
 @pytest.mark.parametrize("event", EXAMPLES, ids=lambda event: event.kind)
 def test_every_kind_survives_the_wire(event: AnyEvent) -> None:
     assert EVENT.validate_json(event.model_dump_json()) == event
