@@ -49,8 +49,8 @@ def console_view(console: Console) -> View:
             "counts": {
                 name: getattr(counts, name) for name in counts.__slots__ if name != "successes"
             },
-            "disk_left": controller.disk_left,
-            "disk_low": controller.disk_low,
+            "disk_left": controller.disk.left,
+            "disk_low": controller.disk.low,
             **_verdicts(console, state),
             "elapsed": (time.time_ns() - state.opened_ns) / 1e9 if state.opened_ns else None,
             "recordings": console.recordings is not no_recording,

@@ -374,10 +374,10 @@ def test_the_session_ends_within_a_second_wherever_it_waits(bench: Any, in_threa
 
 def test_a_full_disk_ends_the_session_before_the_next_trial(make_bench: Any) -> None:
     left = iter([60, 2, 1])
-    bench = make_bench(trials_left=lambda: next(left), disk_minimum=2)
-    assert not bench.controller.disk_low
+    bench = make_bench(trials_left=lambda: next(left))
+    assert not bench.controller.disk.low
     bench.labelled()
-    assert bench.controller.disk_low
+    assert bench.controller.disk.low
     with pytest.raises(DiskFullError, match="room for 1 more .* --resume"):
         bench.controller.next_work()
 
