@@ -115,11 +115,10 @@ class ConsoleApi:
         self.presence.alive()
         if command.tick is None and command.kind is not CommandKind.STOP:
             raise HTTPException(422, "a command echoes the newest tick of the stream")
-        submit, actor = self.console.controller.submit, self.console.actor
         if command.kind is CommandKind.STOP:
             loop = asyncio.get_running_loop()
-            return await loop.run_in_executor(self._stop_worker, submit, command, actor)
-        return await asyncio.to_thread(submit, command, actor)
+            return await loop.run_in_executor(self._stop_worker, self.console.submit, command)
+        return await asyncio.to_thread(self.console.submit, command)
 
     def _picture(self, trial_id: str, take: int, name: str) -> Response:
         try:
@@ -131,7 +130,7 @@ class ConsoleApi:
         return Response(content, media_type="image/png")
 
     def _review(self, wanted: Annotated[Filter, Query()]) -> View:
-        second = self.console.second
+        second, operator = self.console.second, self.console.actor.operator
         if second and wanted.tells_verdicts:
             raise HTTPException(403, "a second operator does not filter by the first one's verdict")
         with self.console.controller.reading() as state:
@@ -139,7 +138,7 @@ class ConsoleApi:
                 "found_by": wanted.found_by,
                 "models": () if second else models_scored(state),
                 "objects": sorted({t.planned.object_name for t in state.trials.values()}),
-                "trials": review_list(state, wanted, hide_labels=second),
+                "trials": review_list(state, wanted, second=operator if second else None),
             }
 
     def _recording(self, trial_id: Annotated[str, Body(embed=True)]) -> dict[str, str]:

@@ -26,6 +26,7 @@ class CommandKind(StrEnum):
     RELABEL = "relabel"
     SECOND_LABEL = "second_label"
     UNDO = "undo"
+    UNDO_SECOND = "undo_second"
     REDO = "redo"
     VOID = "void"
     SKIP = "skip"
@@ -100,6 +101,7 @@ VALUE_MODELS: dict[CommandKind, type[Value]] = {
     CommandKind.RELABEL: RelabelValue,
     CommandKind.SECOND_LABEL: LabelValue,
     CommandKind.UNDO: Nothing,
+    CommandKind.UNDO_SECOND: Nothing,
     CommandKind.REDO: RedoValue,
     CommandKind.VOID: ReasonValue,
     CommandKind.SKIP: NoteValue,

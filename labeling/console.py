@@ -5,14 +5,21 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Literal
+from typing import Final, Literal
 
-from labeling.commands import Actor
+from labeling.commands import Actor, Answer, Command, CommandKind
 from labeling.controller import SessionController
+from labeling.judging import rejection
 from labeling.pictures import PictureShelf
 from logs.journal.state import TrialState
 
 Recordings = Callable[[TrialState], Path | None]
+
+
+SECOND_KINDS: Final = frozenset({CommandKind.SECOND_LABEL, CommandKind.UNDO_SECOND})
+"""What a second operator does, and nobody else."""
+REVIEW_KINDS: Final = frozenset({CommandKind.RELABEL, CommandKind.UNDO})
+"""What a review does: nothing in it moves, and its session is over."""
 
 
 def no_recording(trial: TrialState) -> Path | None:
@@ -53,3 +60,17 @@ class Console:
     second: bool = False
     sitting_since: int = 0
     hold_without_console: bool = True
+
+    @property
+    def kinds(self) -> frozenset[CommandKind]:
+        """What may be asked for at this console."""
+        if self.mode == "run":
+            return frozenset(CommandKind) - SECOND_KINDS
+        return (SECOND_KINDS if self.second else REVIEW_KINDS) | {CommandKind.NOTE}
+
+    def submit(self, command: Command) -> Answer:
+        """Act upon a command in the name of who operates this console; thread-safe."""
+        if command.kind in self.kinds:
+            return self.controller.submit(command, self.actor)
+        with self.controller.reading() as state:
+            return rejection(state, command, f"{command.kind.value} is not for this console")

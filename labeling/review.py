@@ -7,7 +7,7 @@ from typing import Final
 from pydantic import BaseModel, ConfigDict
 
 from labeling.view import View, label_view, trial_view
-from logs.journal.events import Outcome
+from logs.journal.events import LabelEvent, Outcome
 from logs.journal.state import SessionState, TakeState, TrialState
 
 DISAGREEMENT: Final = "disagreement"
@@ -42,18 +42,20 @@ class Filter(BaseModel):
         return DISAGREEMENT if self.disagrees_with else None
 
 
-def review_list(state: SessionState, wanted: Filter, *, hide_labels: bool) -> list[View]:
+def review_list(state: SessionState, wanted: Filter, *, second: str | None) -> list[View]:
     """The executed trials that match, in planned order.
 
     Args:
         state: the session.
         wanted: what to list.
-        hide_labels: a second operator must not see the first one's verdict.
+        second: the name of a second operator, to whom only their own verdicts are shown, and only
+            trials that they may judge: labeled, and by somebody else.
     """
     return [
-        _item(trial, take, hide_labels=hide_labels)
+        _item(trial, take, take.label if second is None else take.second_labels.get(second))
         for trial in state.trials.values()
         if (take := trial.valid_take) is not None and not trial.skipped
+        if second is None or (take.label is not None and take.label.operator != second)
         if matches(trial, take, wanted)
     ]
 
@@ -94,10 +96,9 @@ def _margin_below(take: TakeState, limit: float) -> bool:
     return isinstance(margin, (int, float)) and margin < limit
 
 
-def _item(trial: TrialState, take: TakeState, *, hide_labels: bool) -> View:
+def _item(trial: TrialState, take: TakeState, shown: LabelEvent | None) -> View:
     return {
         **trial_view(trial, take),
-        "label": None if hide_labels else label_view(take),
-        "second_labels": sorted(take.second_labels),
+        "label": label_view(shown),
         "needs_label": trial.needs_label,
     }

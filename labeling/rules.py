@@ -181,6 +181,16 @@ def _undo(state: SessionState, trial: TrialState, value: Value, who: Fields, _: 
     return _make(ev.Undone, who, undoes=newest.seq)
 
 
+def _undo_second(
+    state: SessionState, trial: TrialState, value: Value, who: Fields, _: bool
+) -> AnyEvent:
+    take = trial.valid_take
+    own = take.second_entry(cast(str, who["operator"])) if take else None
+    if own is None:
+        raise RefusedError(f"you have given trial {trial.planned.number} no second label")
+    return _make(ev.Undone, who, undoes=own.seq)
+
+
 def _redo(state: SessionState, trial: TrialState, value: Value, who: Fields, _: bool) -> AnyEvent:
     _not_moving(trial)
     take = trial.active_take
@@ -214,6 +224,7 @@ _TRIAL_RULES: Final[
     CommandKind.RELABEL: _relabel,
     CommandKind.SECOND_LABEL: _second_label,
     CommandKind.UNDO: _undo,
+    CommandKind.UNDO_SECOND: _undo_second,
     CommandKind.REDO: _redo,
     CommandKind.VOID: _void,
     CommandKind.SKIP: _skip,

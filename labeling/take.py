@@ -141,7 +141,7 @@ class Take:
             )
 
     def reset(self) -> None:
-        """The robot goes home and clears the table, whatever was decided."""
+        """Enter the phase between two takes, whatever was decided."""
         self._enter(Phase.RESET, {})
 
     @property

@@ -7,7 +7,7 @@ from typing import Any, Final
 
 from labeling.console import Console, no_recording
 from labeling.taxonomy import CAUSE_TEXT, KEYS, REASON_TEXT, RULE
-from logs.journal.events import Outcome, Phase
+from logs.journal.events import LabelEvent, Outcome, Phase
 from logs.journal.state import SessionState, TakeState, TrialState
 
 View = dict[str, Any]
@@ -56,7 +56,7 @@ def console_view(console: Console) -> View:
             "recordings": console.recordings is not no_recording,
             "second": console.second,
             "trial": _current(console, state),
-            "undoable": None if console.second else _undoable(state, console.sitting_since),
+            "undoable": _undoable(console, state),
             "recent_commands": list(state.commands)[-REMEMBERED_COMMANDS:],
             "next": _upcoming(state),
         }
@@ -126,9 +126,8 @@ def _again_because(trial: TrialState, take: TakeState) -> str:
     return earlier[-1].ended_because if earlier else ""
 
 
-def label_view(take: TakeState) -> View | None:
-    """The verdict that counts."""
-    label = take.label
+def label_view(label: LabelEvent | None) -> View | None:
+    """A verdict."""
     if label is None:
         return None
     return {
@@ -153,8 +152,12 @@ def _current(console: Console, state: SessionState) -> View | None:
     }
 
 
-def _undoable(state: SessionState, since: int) -> View | None:
-    found = state.last_decision(since)
+def _undoable(console: Console, state: SessionState) -> View | None:
+    since = console.sitting_since
+    if console.second:
+        found = state.last_second_verdict(console.actor.operator, since)
+    else:
+        found = state.last_decision(since)
     if found is None:
         return None
     trial, entry = found
@@ -189,7 +192,7 @@ def _settled(trial: TrialState, take: TakeState, *, scores: bool) -> View:
         "object": trial.planned.object_name,
         "take": take.take,
         "status": trial.status,
-        "label": label_view(take),
+        "label": label_view(take.label),
     }
     if scores and trial.status == "labelled":
         shown["scores"] = {model: score.value for model, score in take.scores.items()}

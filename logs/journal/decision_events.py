@@ -79,7 +79,7 @@ class Skipped(TrialEvent, Decided):
 
 
 class Undone(TrialEvent, Decided):
-    """The trial's newest decision (label, relabel, redo, skip) no longer holds."""
+    """A decision no longer holds: the trial's newest, or a second operator's newest verdict."""
 
     kind: Literal["undo"] = "undo"
     undoes: int = Field(description="sequence number of the decision")

@@ -109,6 +109,22 @@ class SessionState:
         made = [pair for pair in made if pair[1].seq > after]
         return max(made, key=lambda pair: pair[1].seq, default=None)
 
+    def last_second_verdict(self, operator: str, after: int = 0) -> tuple[TrialState, Entry] | None:
+        """A further operator's newest verdict that holds: what their undo would take back.
+
+        Args:
+            operator: whose verdicts.
+            after: only verdicts that the journal got after this entry's number.
+        """
+        given = [
+            (trial, entry)
+            for trial in self.trials.values()
+            if (take := trial.valid_take) is not None
+            and (entry := take.second_entry(operator)) is not None
+            and entry.seq > after
+        ]
+        return max(given, key=lambda pair: pair[1].seq, default=None)
+
     def apply(self, entry: Entry) -> None:
         """Add one entry."""
         event = entry.event
@@ -186,9 +202,6 @@ class SessionState:
             case ev.Noted():
                 trial.notes.append(event.text)
                 return
-            case ev.SecondLabelled():
-                trial.find_take(event.take).second_labels[event.operator] = event
-                return
             case ev.PhaseEntered():
                 self._enter_phase(trial, event)
                 return
@@ -244,6 +257,8 @@ class SessionState:
                 trial.find_take(event.take).labels.append((entry, event))
                 trial.needs_label = ""
                 trial.decisions.append(entry)
+            case ev.SecondLabelled() as event:
+                trial.find_take(event.take).second_verdicts.append((entry, event))
             case ev.Redone() as event:
                 self._end_take(trial, entry, "redone", event.cause.value)
             case ev.Skipped():
@@ -267,6 +282,8 @@ class SessionState:
             trial.takes[-1].ended_because = because
 
     def _undo(self, trial: TrialState, seq: int) -> None:
+        for take in trial.takes:
+            take.second_verdicts = [pair for pair in take.second_verdicts if pair[0].seq != seq]
         undone = [entry for entry in trial.decisions if entry.seq == seq]
         trial.decisions = [entry for entry in trial.decisions if entry.seq != seq]
         for event in (entry.event for entry in undone):

@@ -35,6 +35,7 @@ class TakeState:
         take: counts from 1.
         segment: of the session in which it was executed: grows with each accepted change of set-up.
         labels: all verdicts that hold, oldest first.
+        second_verdicts: all further operators' verdicts that hold, oldest first.
         stopped: the software stop was pressed between placing and the end of the motion.
     """
 
@@ -51,7 +52,7 @@ class TakeState:
     replaced: bool = False
     accepted_rival: int | None = None
     labels: list[tuple[Entry, LabelEvent]] = field(default_factory=list)
-    second_labels: dict[str, LabelEvent] = field(default_factory=dict)
+    second_verdicts: list[tuple[Entry, LabelEvent]] = field(default_factory=list)
     stopped: bool = False
     scores: dict[str, ev.Scored] = field(default_factory=dict)
     ended_because: str = ""
@@ -60,6 +61,18 @@ class TakeState:
     def label(self) -> LabelEvent | None:
         """The newest verdict that holds."""
         return self.labels[-1][1] if self.labels else None
+
+    @property
+    def second_labels(self) -> dict[str, LabelEvent]:
+        """Each further operator's newest verdict that holds."""
+        return {label.operator: label for _, label in self.second_verdicts}
+
+    def second_entry(self, operator: str) -> Entry | None:
+        """The entry of a further operator's newest verdict that holds."""
+        own = (
+            entry for entry, label in reversed(self.second_verdicts) if label.operator == operator
+        )
+        return next(own, None)
 
     @property
     def blind_label(self) -> LabelEvent | None:

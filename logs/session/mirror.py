@@ -97,7 +97,7 @@ class AnnotationMirror:
 
     def _remember(self, entry: Entry) -> None:
         event = entry.event
-        if isinstance(event, ev.Labelled | ev.Relabelled):
+        if isinstance(event, ev.LabelEvent):
             self._takes[entry.seq] = event.take
         if isinstance(event, ev.Executed):
             self._newest_take[event.trial_id] = event.take

@@ -12,8 +12,12 @@ from typing import Any
 import httpx
 import pytest
 
+from labeling.commands import Actor
 from labeling.presence import SILENCE_LIMIT, Presence
+from logs.journal.events import Source
 from logs.journal.file import read_journal
+
+BO = Actor("bo", Source.OPERATOR)
 
 PNG = b"\x89PNG\r\n\x1a\n" + b"pixels"
 
@@ -141,7 +145,7 @@ def test_the_review_hides_predictions_and_from_a_second_operator_the_label(
     bench.score(1, 0.987654)
     bench.labelled("success")
     plain = client_of(serve(bench, mode="review"))
-    second = client_of(serve(bench, mode="review", second=True))
+    second = client_of(serve(bench, mode="review", second=True, actor=BO))
     listed = plain.get("/api/review").json()
     assert [item["number"] for item in listed["trials"]] == [1, 2]
     assert listed["models"] == ["reach"]
@@ -179,7 +183,7 @@ def test_a_second_operator_cannot_filter_by_the_first_ones_verdicts(
 ) -> None:
     bench.labelled("failure", reason="missed")
     bench.score(1, 0.9)
-    client = client_of(serve(bench, mode="review", second=True))
+    client = client_of(serve(bench, mode="review", second=True, actor=BO))
     for wanted in (
         {"outcome": "success"},
         {"outcome": "unlabelled"},
@@ -191,6 +195,59 @@ def test_a_second_operator_cannot_filter_by_the_first_ones_verdicts(
     found = client.get("/api/review", params={"object": "pawn", "margin_below": 9}).json()
     assert [item["number"] for item in found["trials"]] == [1]
     assert list(found["models"]) == []
+
+
+def test_a_second_operator_sees_and_takes_back_their_own_verdicts_only(
+    bench: Any, serve: Any, client_of: Any
+) -> None:
+    bench.labelled("failure", reason="missed")
+    bench.labelled("success")
+    bench.labelled("success")
+    bench.do("relabel", 3, by=BO, outcome="success")  # bo's own trial: no second verdict of theirs
+    since = bench.state.seq
+    client = client_of(serve(bench, mode="review", second=True, actor=BO, sitting_since=since))
+
+    def shown() -> list[Any]:
+        return [item["label"] for item in client.get("/api/review").json()["trials"]]
+
+    assert shown() == [None, None]
+    for number in (1, 2):
+        assert post(client, bench, "second_label", number, outcome="success").json()["rev"] == (
+            bench.trial(number).rev
+        )
+    assert [label["operator"] for label in shown()] == ["bo", "bo"]
+    undoable = client.get("/api/view").json()["undoable"]
+    assert (undoable["number"], undoable["kind"]) == (2, "second_label")
+    assert post(client, bench, "undo_second", 2).json()["status"] == "stored"
+    assert client.get("/api/view").json()["undoable"]["number"] == 1
+    assert shown()[1] is None
+    assert [bench.trial(n).label.outcome for n in (1, 2)] == ["failure", "success"]
+    answer = post(client, bench, "undo_second", 2).json()
+    assert (answer["status"], "no second label" in answer["message"]) == ("rejected", True)
+
+
+@pytest.mark.parametrize(
+    ("second", "kind", "value"),
+    [
+        (True, "relabel", {"outcome": "success"}),
+        (True, "undo", {}),
+        (True, "redo", {"cause": "seeing"}),
+        (False, "second_label", {"outcome": "success"}),
+        (False, "skip", {}),
+        (False, "pause", {}),
+        (False, "stop", {}),
+    ],
+)
+def test_a_review_takes_only_what_belongs_to_it(
+    bench: Any, serve: Any, client_of: Any, second: bool, kind: str, value: dict[str, Any]
+) -> None:
+    bench.labelled("failure", reason="missed")
+    before = bench.state.seq
+    client = client_of(serve(bench, mode="review", second=second, actor=BO))
+    number = None if kind in ("pause", "stop") else 1
+    answer = post(client, bench, kind, number, **value).json()
+    assert (answer["status"], answer["message"]) == ("rejected", f"{kind} is not for this console")
+    assert bench.state.seq == before
 
 
 def test_an_unknown_filter_is_refused(bench: Any, serve: Any, client_of: Any) -> None:
@@ -271,7 +328,7 @@ def test_a_key_press_is_stored_within_forty_milliseconds(
 def test_a_review_shows_no_verdicts_beside_the_list(bench: Any, serve: Any, client_of: Any) -> None:
     bench.labelled("failure", reason="missed")
     bench.score(1, 0.987654)
-    client = client_of(serve(bench, mode="review", second=True))
+    client = client_of(serve(bench, mode="review", second=True, actor=BO))
     view = client.get("/api/view")
     assert "missed" not in view.text and "0.987" not in view.text
     assert (view.json()["history"], view.json()["success"]) == ([], {})

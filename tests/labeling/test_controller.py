@@ -416,6 +416,32 @@ def test_a_second_label_never_replaces_the_first(bench: Any) -> None:
     assert bench.trial(1).takes[0].second_labels["bob"].outcome == "failure"
 
 
+def test_a_second_operators_undo_is_an_event_and_touches_no_other_verdict(
+    make_bench: Callable[..., Any],
+) -> None:
+    bench = make_bench()
+    bench.labelled()
+    take = bench.trial(1).takes[0]
+    cy = Actor("cy", Source.OPERATOR)
+    stale = bench.command("second_label", 1, outcome="success")
+    bench.do("second_label", 1, by=BOB, outcome="success")
+    assert bench.controller.submit(stale, BOB).status == "stale"
+    bench.do("second_label", 1, by=cy, outcome="success")
+    bench.do("second_label", 1, by=BOB, outcome="failure", reason="other")
+    assert bench.do("undo_second", 1, by=BOB).status == "stored"
+    assert take.second_labels["bob"].outcome == "success"  # the verdict before it holds again
+    assert bench.do("undo_second", 1, by=BOB).status == "stored"
+    assert set(take.second_labels) == {"cy"}
+    assert "no second label" in bench.do("undo_second", 1, by=BOB).message
+    assert bench.do("undo", 1).status == "stored"  # the first operator's own
+    assert (take.label, set(take.second_labels)) == (None, {"cy"})
+    bench.controller.close("ended")
+    again = make_bench()  # the fold after a restart says the same
+    assert set(again.trial(1).takes[0].second_labels) == {"cy"}
+    assert again.state.last_second_verdict("cy")[0].trial_id == again.trial(1).trial_id
+    assert again.state.last_second_verdict("bob") is None
+
+
 def test_a_note_is_kept_with_its_trial_and_needs_a_text(bench: Any) -> None:
     assert bench.do("note", text="  ").status == "rejected"
     assert bench.do("note", 1, text="scratched pad").status == "stored"

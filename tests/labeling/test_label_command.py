@@ -98,7 +98,14 @@ def test_a_second_operator_labels_blindly_and_agreement_is_printed(bench: Any, s
     printed, _ = process.communicate(timeout=10)
     assert "1 of 2 pairs of blind verdicts on 2 trials agree" in printed
     found = json.loads(run(LABEL, str(bench.folder.path), "--agreement", "--json"))
-    assert found == {"pairs": 2, "trials": 2, "agreed": 1, "kappa": 0.0}
+    assert found == {
+        "pairs": 2,
+        "trials": 2,
+        "agreed": 1,
+        "kappa": 0.0,
+        "interval": None,
+        "undefined": "",
+    }
 
 
 def test_a_session_under_way_is_not_relabeled(bench: Any) -> None:

@@ -10,7 +10,16 @@ from typing import Any
 import pytest
 
 from logs.errors import JournalWriteError
-from logs.journal.events import Executed, Labelled, Outcome, Scored, SensorVerdict, Source, Undone
+from logs.journal.events import (
+    Executed,
+    Labelled,
+    Outcome,
+    Scored,
+    SecondLabelled,
+    SensorVerdict,
+    Source,
+    Undone,
+)
 from logs.journal.file import read_journal
 from logs.journal.state import PlannedEntry
 from logs.record.annotation_files import read_annotations
@@ -60,6 +69,21 @@ def test_a_label_and_its_withdrawal_get_files_and_a_score_is_left_to_its_maker(
     )
     journal.wait_mirrored()
     assert read_annotations(take).label is None
+
+
+def test_a_second_verdict_and_its_withdrawal_get_files(
+    folder: SessionFolder, journal: MirroredJournal
+) -> None:
+    take = folder.trial_folder("t1")
+    take.mkdir()
+    given = journal.append(
+        SecondLabelled(**{**LABEL.model_dump(exclude={"kind"}), "operator": "bo"})
+    )
+    journal.append(Undone(trial_id="t1", undoes=given.seq, operator="bo", source=Source.OPERATOR))
+    journal.wait_mirrored()
+    second, withdrawal = read_annotations(take).labels
+    assert (second.second, second.operator) == (True, "bo")
+    assert withdrawal.withdraws == str(given.seq)
 
 
 def test_a_label_is_stored_while_its_file_still_waits(
