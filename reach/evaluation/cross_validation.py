@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -19,7 +20,7 @@ from reach.errors import InvalidInputError
 from reach.evaluation.bootstrap import OBJECT_METRICS
 from reach.evaluation.cases import GraspCase, Outcomes
 from reach.evaluation.scored import Parameter
-from reach.evaluation.scoring import Scorer, score_cases
+from reach.evaluation.scoring import Scorer, score_draws
 from reach.evaluation.table import mean_metrics, object_metrics
 
 if TYPE_CHECKING:
@@ -110,6 +111,12 @@ def drawable(make: MakeScorer, name: str) -> bool:
     )
 
 
+def label_of(model: str, saturated: bool | None) -> str:
+    """Name of a row: the model, and how its depth was treated where it has one."""
+    depth = {True: ", saturated", False: ", unsaturated", None: ""}[saturated]
+    return model + depth
+
+
 def cross_validate(
     cases: Sequence[GraspCase],
     make: MakeScorer,
@@ -137,7 +144,7 @@ def cross_validate(
         seed: of the perturbations.
         backend: see [score_cases][reach.evaluation.scoring.score_cases].
         jobs: number of workers.
-        progress: called with the name, the number of scores done, and their total.
+        progress: called with the row's name, the number of grasps done, and their total.
 
     Raises:
         InvalidInputError: fewer than two objects with a success.
@@ -150,26 +157,16 @@ def cross_validate(
         )
     known = set(make(name).parameters)
     used = [{k: v for k, v in draw.items() if k in known} for draw in draws]
-    all_scores = np.empty((len(draws), len(cases)))
-    for i, draw in enumerate(used):
-        chosen: dict[str, Parameter] = dict(draw)
-        if saturated is not None:
-            chosen["saturate"] = saturated
-        done_before = i * len(cases)
-
-        def report(done: int, total: int, before: int = done_before) -> None:
-            if progress:
-                progress(name, before + done, len(draws) * total)
-
-        all_scores[i] = score_cases(
-            cases,
-            make(name, **chosen),
-            pose_error=pose_error,
-            seed=seed,
-            backend=backend,
-            jobs=jobs,
-            progress=report,
-        ).values
+    treatment: dict[str, Parameter] = {} if saturated is None else {"saturate": saturated}
+    all_scores = score_draws(
+        cases,
+        [make(name, **draw, **treatment) for draw in used],
+        pose_error=pose_error,
+        seed=seed,
+        backend=backend,
+        jobs=jobs,
+        progress=None if progress is None else partial(progress, label_of(name, saturated)),
+    )
     return choose(outcomes, all_scores, used, name, saturated)
 
 

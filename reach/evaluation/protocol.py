@@ -17,6 +17,7 @@ from reach.evaluation.cross_validation import (
     cross_validate,
     draw_parameters,
     drawable,
+    label_of,
     variants,
 )
 from reach.evaluation.gains import PAIRS, Gain, gains
@@ -85,7 +86,7 @@ def run_protocol(
         seed: of the parameters, perturbations and bootstrap.
         backend: see [score_cases][reach.evaluation.scoring.score_cases].
         jobs: number of workers.
-        progress: called with the name, the number of scores done, and their total.
+        progress: called with a row's name, the number of grasps done, and their total.
 
     Raises:
         InvalidInputError: fewer than two objects with a success.
@@ -129,9 +130,3 @@ def run_protocol(
         gains(means, resampled, pairs),
         tuple(name for name in names if name not in drawn),
     )
-
-
-def label_of(model: str, saturated: bool | None) -> str:
-    """Name of a row: the model, and how its depth was treated where it has one."""
-    depth = {True: ", saturated", False: ", unsaturated", None: ""}[saturated]
-    return model + depth

@@ -1,8 +1,8 @@
 """Scores of grasps kept on disk, found again by content.
 
-One append-only file per model, parameters, pose error and seed; a line a grasp. A process that
-is killed leaves at worst one torn line, which is skipped, so that an interrupted evaluation
-goes on where it stopped. The folder may be deleted at any time.
+One append-only file per model, parameters (or sets of them), pose error and seed; a line a grasp. A
+process that is killed leaves at worst one torn line, which is skipped, so that an interrupted
+evaluation goes on where it stopped. The folder may be deleted at any time.
 """
 
 from __future__ import annotations
@@ -11,6 +11,7 @@ import dataclasses
 import hashlib
 import json
 import os
+from collections.abc import Sequence
 from functools import lru_cache
 
 import numpy as np
@@ -48,11 +49,13 @@ class ScoreCache:
 
     Args:
         model_key: digest of those.
+        width: scores a grasp: one, or one for each of several parameter sets.
     """
 
-    def __init__(self, model_key: str) -> None:
+    def __init__(self, model_key: str, width: int = 1) -> None:
         self._path = cache_folder() / "scores" / f"{model_key}.jsonl"
-        self._known: dict[str, float] = {}
+        self._width = width
+        self._known: dict[str, tuple[float, ...]] = {}
         self._torn = False
         try:
             text = self._path.read_text(encoding="utf-8")
@@ -64,20 +67,22 @@ class ScoreCache:
 
     def _read(self, line: str) -> None:
         try:
-            digest, value = json.loads(line)
-            if isinstance(digest, str) and 0.0 <= float(value) <= 1.0:
-                self._known[digest] = float(value)
+            digest, *values = json.loads(line)
+            scores = tuple(float(value) for value in values)
+            inside = all(0.0 <= score <= 1.0 for score in scores)
+            if isinstance(digest, str) and inside and len(scores) == self._width:
+                self._known[digest] = scores
         except (ValueError, TypeError):
             return  # a torn line costs one score
 
-    def get(self, digest: str) -> float | None:
-        """The score of a grasp, or None if it is not known."""
+    def get(self, digest: str) -> tuple[float, ...] | None:
+        """The scores of a grasp, or None if they are not known."""
         return self._known.get(digest)
 
-    def put(self, digest: str, value: float) -> None:
-        """Keep a score. A full or read-only disk costs time later, never a result."""
-        self._known[digest] = value
-        line = json.dumps([digest, value]) + "\n"
+    def put(self, digest: str, scores: Sequence[float]) -> None:
+        """Keep scores. A full or read-only disk costs time later, never a result."""
+        self._known[digest] = tuple(scores)
+        line = json.dumps([digest, *scores]) + "\n"
         if self._torn:
             line, self._torn = "\n" + line, False
         try:

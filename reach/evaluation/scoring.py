@@ -1,17 +1,24 @@
-"""Scoring many grasps by one model: in parallel, cached by content, with progress."""
+"""Scores of a model on labeled grasps, and of a model under many parameter sets."""
 
 from __future__ import annotations
 
-import time
-from collections.abc import Callable, Mapping, Sequence
-from typing import TYPE_CHECKING, Any, Protocol
+from collections.abc import Mapping, Sequence
+from functools import partial
+from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 
+from reach.arrays import FloatArray
 from reach.cache import cache_key
-from reach.errors import UnknownNameError
 from reach.evaluation.cases import GraspCase
-from reach.evaluation.score_cache import ScoreCache, grasp_digest
+from reach.evaluation.collect_scores import (
+    Progress,
+    ScoreGrasp,
+    Workers,
+    collect_scores,
+    timed,
+)
+from reach.evaluation.score_cache import ScoreCache
 from reach.evaluation.scored import Parameter, ScoredModel, used_parameters
 from reach.grasp import Grasp
 from reach.scene import Scene
@@ -20,12 +27,8 @@ from reach.sources import source_digest
 if TYPE_CHECKING:
     from reach.pose_error import PoseError
 
-BACKENDS = ("serial", "threading", "loky", "dask")
 TIMED_AGAIN = 5
 """Grasps scored once more, one after the other, where this run's times would mislead."""
-
-Progress = Callable[[int, int], None]
-"""Called with the number of grasps done and their total."""
 
 
 class Score(Protocol):
@@ -72,43 +75,79 @@ def score_cases(
         scorer: the model; it travels to worker processes by pickling.
         pose_error: the station's, in the object's frame.
         seed: of the perturbations.
-        backend: serial, threading, loky (processes) or dask (an existing cluster: make its
-            `distributed.Client` the current one before).
-        jobs: number of workers of threading and loky; all cores if -1.
+        backend: see [Workers][reach.evaluation.collect_scores.Workers].
+        jobs: number of workers.
         progress: called as scores arrive.
         use_cache: False scores everything anew, and keeps nothing.
 
     Raises:
         UnknownNameError: no such backend.
     """
-    if backend not in BACKENDS:
-        raise UnknownNameError("scoring backend", backend, BACKENDS)
-    cache = ScoreCache(_model_key(scorer, pose_error, seed)) if use_cache else None
-    digests = [grasp_digest(case.scene, case.grasp) for case in cases]
-    known = [cache.get(digest) if cache else None for digest in digests]
-    values = np.array([np.nan if value is None else value for value in known])
-    missing = [i for i, value in enumerate(known) if value is None]
-    done, seconds = len(cases) - len(missing), []
-    if progress:
-        progress(done, len(cases))
-    tasks = [(i, cases[i].scene, cases[i].grasp) for i in missing]
-    for i, value, elapsed in _run(scorer, tasks, pose_error, seed, backend, jobs):
-        values[i] = value
-        seconds.append(elapsed)
-        if cache:
-            cache.put(digests[i], value)
-        done += 1
-        if progress:
-            progress(done, len(cases))
+    workers = Workers(backend, jobs)
+    cache = ScoreCache(_model_key([scorer], pose_error, seed)) if use_cache else None
+    score = partial(_score, scorer, pose_error, seed)
+    values, seconds = collect_scores(cases, score, 1, workers, cache, progress)
     if not seconds or backend != "serial":
-        seconds = _seconds_alone(cases, scorer, pose_error, seed)
+        seconds = _seconds_alone(cases, score)
     parameters = used_parameters(scorer.parameters, pose_error)
-    return ScoredModel(scorer.name, scorer.version, parameters, values, float(np.median(seconds)))
+    return ScoredModel(
+        scorer.name, scorer.version, parameters, values[:, 0], float(np.median(seconds))
+    )
 
 
-def _seconds_alone(
-    cases: Sequence[GraspCase], scorer: Scorer, pose_error: PoseError | None, seed: int
-) -> list[float]:
+def score_draws(
+    cases: Sequence[GraspCase],
+    scorers: Sequence[Scorer],
+    *,
+    pose_error: PoseError | None,
+    seed: int = 0,
+    backend: str = "serial",
+    jobs: int = -1,
+    progress: Progress | None = None,
+) -> FloatArray:
+    """Score every grasp by one model under several sets of its parameters.
+
+    The scores are those of [score_cases][]; the analytic models share between the sets what does
+    not depend on them. Kept as they arrive, grasp by grasp.
+
+    Args:
+        cases: N labeled grasps.
+        scorers: the model with each of D parameter sets.
+        pose_error: the station's, in the object's frame.
+        seed: of the perturbations.
+        backend: see [Workers][reach.evaluation.collect_scores.Workers].
+        jobs: number of workers.
+        progress: called as grasps are done.
+
+    Returns:
+        Shape (D, N).
+
+    Raises:
+        UnknownNameError: no such backend.
+    """
+    workers = Workers(backend, jobs)
+    cache = ScoreCache(_model_key(scorers, pose_error, seed), len(scorers))
+    score = partial(_score_draws, tuple(scorers), pose_error, seed)
+    return collect_scores(cases, score, len(scorers), workers, cache, progress)[0].T
+
+
+def _score(
+    scorer: Scorer, pose_error: PoseError | None, seed: int, scene: Scene, grasp: Grasp
+) -> tuple[float]:
+    return (float(scorer.score(scene, grasp, pose_error=pose_error, seed=seed).value),)
+
+
+def _score_draws(
+    scorers: Sequence[Scorer], pose_error: PoseError | None, seed: int, scene: Scene, grasp: Grasp
+) -> Sequence[float]:
+    from reach.models.draws import scores_of_draws, share_work
+
+    if share_work(scorers):
+        return list(scores_of_draws(scorers, scene, grasp, pose_error=pose_error, seed=seed))
+    return [_score(one, pose_error, seed, scene, grasp)[0] for one in scorers]
+
+
+def _seconds_alone(cases: Sequence[GraspCase], score: ScoreGrasp) -> list[float]:
     """Times of a few grasps from all over the list, with nothing else running in this process.
 
     Each is scored twice and the quicker time taken: what is prepared once for a part is no cost
@@ -116,46 +155,11 @@ def _seconds_alone(
     """
     places = np.linspace(0, len(cases) - 1, min(TIMED_AGAIN, len(cases))).astype(int)
     some = [(int(i), cases[i].scene, cases[i].grasp) for i in places]
-    return [min(_score_one(scorer, task, pose_error, seed)[2] for _ in range(2)) for task in some]
+    return [min(timed(score, *one)[2] for _ in range(2)) for one in some]
 
 
-def _model_key(scorer: Scorer, pose_error: PoseError | None, seed: int) -> str:
+def _model_key(scorers: Sequence[Scorer], pose_error: PoseError | None, seed: int) -> str:
     """Digest of all a list of scores depends on besides the grasps, the code itself included."""
     covariance = None if pose_error is None else pose_error.covariance.tobytes()
-    parameters = sorted(scorer.parameters.items())
-    code = source_digest()
-    return cache_key(scorer.name, scorer.version, code, parameters, covariance, seed)
-
-
-Task = tuple[int, Scene, Grasp]
-Answer = tuple[int, float, float]
-
-
-def _score_one(scorer: Scorer, task: Task, pose_error: PoseError | None, seed: int) -> Answer:
-    """Score one grasp: its index, the score, and the wall time [s]."""
-    index, scene, grasp = task
-    start = time.perf_counter()
-    value = scorer.score(scene, grasp, pose_error=pose_error, seed=seed).value
-    return index, float(value), time.perf_counter() - start
-
-
-def _run(
-    scorer: Scorer,
-    tasks: Sequence[Task],
-    pose_error: PoseError | None,
-    seed: int,
-    backend: str,
-    jobs: int,
-) -> Any:
-    """Yield answers as they come, in any order."""
-    if backend == "serial" or len(tasks) < 2:
-        for task in tasks:
-            yield _score_one(scorer, task, pose_error, seed)
-        return
-    import joblib
-
-    with joblib.parallel_config(backend=backend, **({} if backend == "dask" else {"n_jobs": jobs})):
-        parallel = joblib.Parallel(return_as="generator_unordered", batch_size=1)
-        yield from parallel(
-            joblib.delayed(_score_one)(scorer, task, pose_error, seed) for task in tasks
-        )
+    models = [(one.name, one.version, sorted(one.parameters.items())) for one in scorers]
+    return cache_key(models, source_digest(), covariance, seed)

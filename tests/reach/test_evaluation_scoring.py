@@ -374,7 +374,7 @@ def test_cross_validation_end_to_end_is_resumable():
         for saturated in (True, True, False)
     ]
     assert results[0].to_json() == results[1].to_json()
-    assert seen[-1] == (48, 48)
+    assert seen[-1] == (12, 12)
     assert set(results[2].objects) == {"block 0", "block 1", "block 2"}
     assert results[0].mean["ap"] is not None
     assert "compliance" in results[0].objects["block 0"].parameters
