@@ -13,7 +13,7 @@ from registration.job import Job
 from registration.polish import PRINT_ERROR
 from registration.refine import NEAR, fit_of
 from registration.search import Hypothesis
-from registration.unobservable import open_ends
+from registration.unobservable import open_ways
 
 CLEARLY_WORSE = 0.15
 """A pose whose render cost is this far above the best one's needs no closer comparison."""
@@ -21,6 +21,9 @@ REFUTED = 0.4
 """With this much evidence for another stable pose, the declared one is taken to be wrong."""
 ENOUGH = float(np.log(200.0))
 """Log odds that rule a rival out: at most one wrong decision in two hundred."""
+KNOWN = 4.0
+"""Log odds against a pose at the end of a direction, beyond which less than half a percent of a
+normal distribution lies on both sides: 2.83 standard deviations off."""
 MOST_RIVALS = 5
 
 
@@ -128,27 +131,35 @@ def _rivals(job: Job, chosen: Hypothesis, found: Sequence[Hypothesis]) -> list[R
         and h.cost <= job.profile.max_cost
         and _differ(job, chosen, h)
     ]
-    rated += [RatedRival(h, 0.0, 0.0, ruled_out=False) for h in _open_ends(job, chosen)]
+    rated += _open_ends(job, chosen)
     return sorted(rated, key=lambda rival: (rival.ruled_out, rival.margin))
 
 
-def _open_ends(job: Job, chosen: Hypothesis) -> list[Hypothesis]:
-    """Where the part may be along directions that the image leaves open."""
-    T = open_ends(
+def _open_ends(job: Job, chosen: Hypothesis) -> list[RatedRival]:
+    """Where the part may be along directions that the fit leaves open, and the image too.
+
+    The fit knows only where points lie; the image also shows what the camera would have seen.
+    """
+    ways = open_ways(
         chosen.T_camera_object,
         fit_of(job, chosen).covariance,
         job.obj.com,
         job.options.max_turn_error,
         job.options.max_shift_error,
     )
-    if len(T) == 0:
-        return []
-    cost = chosen.search.check(T).cost
-    ends = [
-        replace(chosen, T_camera_object=pose, cost=float(c), polished=None)
-        for pose, c in zip(T, cost, strict=True)
-    ]
-    return [end for end in ends if _differ(job, chosen, end)]
+    ends = []
+    for way in ways:
+        poses = [replace(chosen, T_camera_object=T, polished=None) for T in way.poses]
+        poses = [pose for pose in poses if _differ(job, chosen, pose)]
+        evidence = _evidence(job, chosen, poses)
+        open_still = np.flatnonzero(evidence.log_odds < KNOWN)
+        if len(open_still) == 0:
+            continue
+        last = int(open_still[-1])
+        cost = float(chosen.search.check(poses[last].T_camera_object[None]).cost[0])
+        margin, odds = float(evidence.margin[last]), float(evidence.log_odds[last])
+        ends.append(RatedRival(replace(poses[last], cost=cost), margin, odds, ruled_out=False))
+    return ends
 
 
 def _rules_out(job: Job, margin: float, log_odds: float) -> bool:
@@ -164,7 +175,7 @@ def _evidence(job: Job, first: Hypothesis, others: Sequence[Hypothesis]) -> Evid
         search.seen,
         poses,
         tolerance=search.fine_tolerance,
-        noise=job.table.noise,
+        noise=search.depth_noise,
         bias=float(np.hypot(job.profile.bias, PRINT_ERROR)),
     )
 

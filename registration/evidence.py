@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from reach.arrays import FloatArray
+from registration.correlation import variance_of_sum
 from registration.mesh_model import MeshModel
 from registration.observation import FOREIGN, NO_RETURN, Observation
 from registration.render_check import GRAZING
@@ -14,6 +15,10 @@ from registration.rendering import Rendered, render
 
 FEW_PIXELS = 12
 """So many differing pixels of full disagreement make a margin of one half."""
+FACE_NOISE, EDGE_NOISE = 2.0, 32.0
+"""Variance of a depth's error beyond the table's noise, in units of that noise's, for each pixel by
+itself: on faces, and where one of the poses is off by more than the tolerance, as beside edges,
+where depths of front and back mix. Measured: decision 0044."""
 PIXELS = 16_000
 """Pixels of the part that are looked at, about: small features decide."""
 
@@ -61,21 +66,22 @@ def compare(
 
     The log odds follow from S, the summed difference of squared residuals. Were the first pose
     true, S would be normal about mu = sum d^2, with d the poses' difference in depth; were the
-    other true, about -mu. Its variance is 4 v, v = noise^2 A mu + bias^2 (sum d)^2, for A
-    neighboring pixels share their noise, and all share the bias. Hence S mu / (2 v).
+    other true, about -mu. Its variance is 4 v, hence S mu / (2 v). In v is what the noise,
+    correlated as on the table, makes of sum d e; what depths err beyond it, at edges above all;
+    and the bias that all depths share.
 
     Args:
         model: of the part.
         seen: the image's window.
         T_camera_object: shape (N + 1, 4, 4).
         tolerance: residuals are cut off here [m].
-        noise: standard deviation of a depth along the normal [m].
+        noise: standard deviation of a depth [m].
         bias: standard deviation of the error that all depths share [m].
     """
     stride = max(1, int(np.sqrt(len(seen.points) / PIXELS)))
     rendered = render(model, seen, T_camera_object, seen.rays(stride), stride)
     predictions = _predictions(seen, rendered, stride)
-    area = max(1.0, seen.table.correlation_area / stride**2)
+    correlation = seen.table.correlation
     few = max(FEW_PIXELS * max(1.0, seen.table.correlation_area / 4) / stride**2, FEW_PIXELS / 2)
     count = len(predictions) - 1
     margin, log_odds = np.zeros(count), np.zeros(count)
@@ -85,20 +91,23 @@ def compare(
         differing = float(np.minimum(1.0, 2 * np.abs(gain) / tolerance**2).sum())
         margin[i] = gain.sum() / tolerance**2 / (differing + few)
         apart = rival - own
+        at_edge = np.maximum(np.abs(own), np.abs(rival)) >= tolerance
+        errs = np.where(at_edge, EDGE_NOISE, FACE_NOISE) * apart**2
         mu = float((apart**2).sum())
-        variance = noise**2 * area * mu + (bias * float(apart.sum())) ** 2
-        log_odds[i] = gain.sum() * mu / (2 * variance) if mu > 0 else 0.0
+        v = noise**2 * (variance_of_sum(apart, correlation, stride) + float(errs.sum()))
+        v += (bias * float(apart.sum())) ** 2
+        log_odds[i] = gain.sum() * mu / (2 * v) if mu > 0 else 0.0
     return Evidence(margin, log_odds)
 
 
 def _residuals(a: _Prediction, b: _Prediction, tolerance: float) -> tuple[FloatArray, FloatArray]:
-    """Residuals (K,) of two poses along the normal, cut off, where they predict differently."""
+    """Residuals (h, w) of two poses, cut off; 0 where they predict the same."""
     differ = a.gap != b.gap
     # The steeper of the two views, so that a grazing face alone decides nothing.
-    slope = np.maximum(np.minimum(a.slope[differ], b.slope[differ]), GRAZING)
+    slope = np.where(differ, np.maximum(np.minimum(a.slope, b.slope), GRAZING), 0.0)
     return (
-        np.clip(a.gap[differ] * slope, -tolerance, tolerance),
-        np.clip(b.gap[differ] * slope, -tolerance, tolerance),
+        np.clip(a.gap * slope, -tolerance, tolerance),
+        np.clip(b.gap * slope, -tolerance, tolerance),
     )
 
 

@@ -12,7 +12,7 @@ from registration.errors import TooFewPointsError
 from registration.frame import DepthFrame
 from registration.mesh_model import MeshModel
 from registration.options import RegistrationOptions, SensorProfile
-from registration.table import Table
+from registration.table import Table, plane_heights
 
 NO_RETURN, TABLE, FOREIGN, PART = -1, 0, 1, 2
 """Labels of pixels; FOREIGN stands on the table but is not the candidate."""
@@ -167,7 +167,7 @@ def scan(
         TooFewPointsError: nothing large enough stands on the table.
     """
     cut = max(profile.cut, 3.0 * table.noise)
-    heights = table_heights(frame, table)
+    heights = plane_heights(frame, table.normal_camera, table.offset_camera)
     with np.errstate(invalid="ignore"):
         above = heights > cut
         too_high = heights > model.obj.diameter + 5e-3 + 4 * table.noise
@@ -191,16 +191,6 @@ def scan(
 
 def _stands(table: Table, points: FloatArray, height: float) -> bool:
     return float(np.quantile(table.heights(points), 0.9)) > height
-
-
-def table_heights(frame: DepthFrame, table: Table) -> NDArray[np.float32]:
-    """Height of every pixel above the table, shape (H, W) [m]; NaN without a return."""
-    k, n = frame.intrinsics, table.normal_camera
-    across = (n[0] * (np.arange(k.width) - k.cx) / k.fx).astype(np.float32)
-    down = (n[1] * (np.arange(k.height) - k.cy) / k.fy + n[2]).astype(np.float32)
-    height: NDArray[np.float32] = frame.depth * (across[None, :] + down[:, None])
-    height -= np.float32(table.offset_camera)
-    return height
 
 
 def _smooth(frame: DepthFrame, above: BoolArray, step: float) -> BoolArray:

@@ -12,7 +12,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from reach.arrays import FloatArray
-from reach.transforms import exp, inverse
+from reach.symmetry import Symmetry
+from reach.transforms import exp, inverse, skew
+from registration.free_turns import told_directions
 from registration.mesh_model import MeshModel
 from registration.observation import Observation
 from registration.options import SensorProfile
@@ -20,13 +22,19 @@ from registration.support import Support
 
 POINTS = 1500
 STEPS = 4
-SHALLOW = 0.4
-"""No wall counts as seen at a slant of less than this cosine: its depths err more. With 0.3 the
-covariance is too small for structured light, with 0.5 too large for stereo (decision 0042)."""
+SHALLOW = 0.3
+"""Depths of a face seen at less than this cosine are not taken to lie any deeper for it."""
 PRINT_ERROR = 3e-5
 """Standard deviation of the part's shape against its mesh, as an offset of the whole pose [m]."""
-UNKNOWN_TURN, UNKNOWN_PLACE = np.radians(60), 0.1
-"""Standard deviations of a direction that nothing tells about [rad, m]."""
+UNKNOWN_TURN, UNKNOWN_PLACE = np.pi / np.sqrt(3.0), 0.1
+"""Standard deviations of a direction that nothing tells about [rad, m]: a turn that may be any."""
+RIM, RIM_ERROR = 0.25, 0.3
+"""Points on faces seen at less than this cosine tell where the part's rim is; they share an error,
+in pixels: those that noise moved outward are taken for the face beyond the edge."""
+SLOPES = (0.4, 0.55, 0.7, 0.85)
+"""Faces are told apart by the cosine between ray and normal when their depths' noise is measured."""
+FEWEST = 60
+"""Points that a measure of their noise needs."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -54,8 +62,11 @@ def polish(
     T_camera_object: FloatArray,
     profile: SensorProfile,
     support: Support | None,
+    sym: Symmetry,
 ) -> Polished:
     """Refine one pose and tell how well it is known.
+
+    About an axis of symmetry it stays as it was; the covariance there is that of any turn.
 
     Args:
         model: of the part.
@@ -63,24 +74,29 @@ def polish(
         T_camera_object: start, shape (4, 4).
         profile: of the sensor.
         support: what the table says of height and tilt; None if the part may lie in any way.
+        sym: of the part.
     """
+    told = told_directions(sym)
     noise = seen.table.noise / seen.table.slope(seen.points.mean(axis=0))
     count = min(POINTS, len(seen.points))
     points = seen.points[np.arange(count) * len(seen.points) // count]
+    effective = _effective(count, len(seen.points), seen.table.correlation_area)
     scale = max(0.4e-3, 3 * noise)
+    rim_error = RIM_ERROR * float(points[:, 2].mean()) / seen.frame.intrinsics.fx
     T = np.array(T_camera_object)
     for step in range(STEPS + 1):
-        residual, jacobian = _in_depth(*_residuals(model, points, T), points, T)
+        residual, jacobian, cosine = _in_depth(*_residuals(model, points, T), points, T)
         weight = (scale**2 / (scale**2 + residual**2)) ** 2
-        sigma = _spread(residual, weight, noise)
-        effective = min(count, len(seen.points) / seen.table.correlation_area)
-        gain = weight * (_efficiency(residual, scale, sigma) * effective / count / sigma**2)
-        information = _weighted_gram(jacobian, gain)
+        sigma = _spread(residual, weight, cosine, noise)
+        gain = weight / sigma**2 * (_efficiency(residual / sigma, weight) * effective / count)
+        gain *= _rim_share(gain, cosine, rim_error)
+        information = told.T @ _weighted_gram(jacobian, gain) @ told
         gradient = (jacobian * (gain * residual)[:, None]).sum(axis=0)
-        total = information + _vague()
+        total = information + _vague(model.obj.com)
         if support is not None:
             prior, pull = support.information(T)
-            total, gradient = total + prior, gradient + pull
+            total, gradient = total + told.T @ prior @ told, gradient + pull
+        gradient = told.T @ gradient
         if step == STEPS:
             break
         T = T @ exp(-np.linalg.solve(total, gradient))
@@ -125,17 +141,29 @@ def _residuals(
 
 def _in_depth(
     residual: FloatArray, jacobian: FloatArray, points_camera: FloatArray, T: FloatArray
-) -> tuple[FloatArray, FloatArray]:
-    """Residuals (N,) and Jacobian (N, 6) along the rays, where the sensor errs.
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Residuals (N,) and Jacobian (N, 6) along the rays, where the sensor errs, and |cosines| (N,).
 
     A depth's error moves a point across a face seen at a slant by less: such faces, the walls
-    that tell how a part is turned, are known better than their share of points says. Below the
-    cosine SHALLOW depths err more, too.
+    that tell how a part is turned, are known better than their share of points says.
     """
-    ray = points_camera / points_camera[:, 2, None]
+    ray = points_camera / np.sqrt((points_camera**2).sum(axis=1))[:, None]
     normal = (jacobian[:, None, 3:] * T[None, :3, :3]).sum(axis=2)
-    slope = np.maximum(np.abs((normal * ray).sum(axis=1)), SHALLOW)
-    return residual / slope, jacobian / slope[:, None]
+    cosine = np.abs((normal * ray).sum(axis=1))
+    slope = np.maximum(cosine, SHALLOW)
+    return residual / slope, jacobian / slope[:, None], cosine
+
+
+def _effective(count: int, total: int, correlation_area: float) -> float:
+    """How many independent points some spread evenly over all points are worth."""
+    return count / (1.0 + (correlation_area - 1.0) * count / total)
+
+
+def _rim_share(gain: FloatArray, cosine: FloatArray, rim_error: float) -> FloatArray:
+    """What is left of the information (N,) of points at the rim, as they share an error [m]."""
+    rim = cosine < RIM
+    told = float(gain[rim].sum())
+    return np.where(rim, 1.0 / (1.0 + told * rim_error**2), 1.0)
 
 
 def _weighted_gram(jacobian: FloatArray, gain: FloatArray) -> FloatArray:
@@ -145,30 +173,50 @@ def _weighted_gram(jacobian: FloatArray, gain: FloatArray) -> FloatArray:
     return result
 
 
-def _spread(residual: FloatArray, weight: FloatArray, noise: float) -> float:
-    """Robust standard deviation of the residuals, not below most of the table's noise [m]."""
-    inlying = np.abs(residual[weight > 0.25])
-    spread = 1.4826 * float(np.median(inlying)) if len(inlying) else 0.0
-    return max(spread, 0.7 * noise)
+def _spread(
+    residual: FloatArray, weight: FloatArray, cosine: FloatArray, noise: float
+) -> FloatArray:
+    """Robust standard deviation of each residual (N,), by the slant of its face [m].
+
+    It is measured on the part: depths of faces seen at a slant err more than the table's. It is
+    no less than most of the table's noise, and no less than that of less slanted faces.
+    """
+    inlying = weight > 0.25
+    sigma = np.empty(len(residual))
+    least = 0.7 * noise
+    slant = np.digitize(cosine, SLOPES)
+    for kind in range(len(SLOPES), -1, -1):
+        own = slant == kind
+        known = np.abs(residual[own & inlying])
+        if len(known) >= FEWEST:
+            least = max(least, 1.4826 * float(np.median(known)))
+        sigma[own] = least
+    return sigma
 
 
-def _efficiency(residual: FloatArray, scale: float, sigma: float) -> float:
+def _efficiency(standard: FloatArray, weight: FloatArray) -> float:
     """What a robust fit's weighted residuals (N,) tell, over what their weights alone would say.
 
     The variance of an M-estimate is E[psi^2] / E[psi']^2, not sigma^2 / E[psi / r] ([Huber1981]).
+
+    Args:
+        standard: residuals in units of their standard deviations, shape (N,).
+        weight: psi / r of each, shape (N,).
     """
-    share = scale**2 / (scale**2 + residual**2)
-    weight = share**2
-    steepness = float((weight * (4 * share - 3)).mean())
-    power = float(((weight * residual) ** 2).mean())
+    steepness = float((weight * (4 * np.sqrt(weight) - 3)).mean())
+    power = float(((weight * standard) ** 2).mean())
     if power <= 0.0:
         return 1.0
-    return float(np.clip(steepness**2 * sigma**2 / (power * weight.mean()), 0.5, 1.2))
+    return float(np.clip(steepness**2 / (power * weight.mean()), 0.5, 1.2))
 
 
-def _vague() -> FloatArray:
+def _vague(com: FloatArray) -> FloatArray:
     """Information of knowing nothing: keeps unobservable directions where they started."""
-    return np.diag([UNKNOWN_TURN**-2.0] * 3 + [UNKNOWN_PLACE**-2.0] * 3)
+    to_com = np.eye(6)
+    to_com[3:, :3] = -skew(com)
+    vague = np.diag([UNKNOWN_TURN**-2.0] * 3 + [UNKNOWN_PLACE**-2.0] * 3)
+    result: FloatArray = to_com.T @ vague @ to_com
+    return result
 
 
 def _systematic(

@@ -98,7 +98,9 @@ def fit_of(job: Job, hypothesis: Hypothesis) -> Polished:
     if hypothesis.polished is not None:
         return hypothesis.polished
     T = hypothesis.T_camera_object
-    return polish(job.model, hypothesis.search.seen, T, job.profile, _support(job, hypothesis))
+    return polish(
+        job.model, hypothesis.search.seen, T, job.profile, _support(job, hypothesis), job.sym
+    )
 
 
 def _support(job: Job, hypothesis: Hypothesis) -> Support | None:

@@ -126,33 +126,43 @@ class Registration:
         *,
         max_turn: float = float(np.radians(5.0)),
         max_shift: float = 2e-3,
+        max_surface: float = 1e-3,
     ) -> bool:
         """Whether a grasp lands on the same place of the part whichever rival is true.
 
         The gripper goes where the chosen pose puts it. Had a rival been true, it would stand
         at another T_object_gripper; only if that is the planned one up to a symmetry of the
-        part, for every rival that is not ruled out, may an ambiguous trial run unasked.
+        part, for every rival that is not ruled out, may an ambiguous trial run unasked. A turn
+        that moves the surface nowhere by more than a gripper can notice is such a symmetry: the
+        hand meets the same shape. Nobody could tell such rivals apart if asked.
 
         Args:
             obj: the part.
             T_object_gripper: the planned grasp, shape (4, 4).
             max_turn: rotation that still counts as the same [rad].
             max_shift: translation that still counts as the same [m].
+            max_surface: distance between two poses' surfaces that no grasp notices [m]; zero
+                allows symmetries of the part alone.
         """
         from reach.symmetry import symmetry
         from registration.grasp_symmetry import same_grasp
+        from registration.mesh_model import mesh_model
 
         T_object_gripper = as_transform(T_object_gripper, "T_object_gripper")
         T_world_gripper = self.T_world_object @ T_object_gripper
-        sym = symmetry(obj)
-        return all(
-            same_grasp(
+        sym, open_rivals = symmetry(obj), [r.T_world_object for r in self.rivals if not r.ruled_out]
+        others = [
+            T_world_object
+            for T_world_object in open_rivals
+            if not same_grasp(
                 sym,
                 T_object_gripper,
-                inverse(rival.T_world_object) @ T_world_gripper,
+                inverse(T_world_object) @ T_world_gripper,
                 max_turn,
                 max_shift,
             )
-            for rival in self.rivals
-            if not rival.ruled_out
-        )
+        ]
+        if not others:
+            return True
+        apart = mesh_model(obj).surface_distances(self.T_world_object, np.stack(others))
+        return bool(apart.max() <= max_surface)

@@ -63,13 +63,18 @@ class Search:
         model: of the part.
         seen: the image's window.
         profile: of the sensor.
-        noise: standard deviation of a depth, measured on the table [m].
+        noise: standard deviation of the table's heights [m].
     """
 
     model: MeshModel
     seen: Observation
     profile: SensorProfile
     noise: float
+
+    @property
+    def depth_noise(self) -> float:
+        """Standard deviation of a depth along its ray [m]: the table shows only its height."""
+        return self.noise / self.seen.table.slope(self.seen.points.mean(axis=0))
 
     @property
     def fine_tolerance(self) -> float:

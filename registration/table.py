@@ -5,8 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from reach.arrays import FloatArray
+from registration.correlation import autocorrelation
 from registration.errors import NoTableError
 from registration.frame import DepthFrame
 
@@ -27,8 +29,7 @@ class Table:
         offset_camera: normal_camera @ p for points p on the table, camera frame [m].
         rms: of the table's points about the plane, outliers left out [m].
         noise: robust standard deviation of a single depth, along the normal [m].
-        correlation_area: how many neighboring pixels share one error [pixel]: n pixels say as
-            much about their mean as n / correlation_area independent ones.
+        correlation: of the errors of neighboring pixels, see `registration.correlation`.
         T_world_camera: the calibrated pose of the camera, shape (4, 4).
     """
 
@@ -36,8 +37,16 @@ class Table:
     offset_camera: float
     rms: float
     noise: float
-    correlation_area: float
+    correlation: FloatArray
     T_world_camera: FloatArray
+
+    @property
+    def correlation_area(self) -> float:
+        """How many neighboring pixels share one error [pixel].
+
+        n pixels say as much about their mean as n / correlation_area independent ones.
+        """
+        return max(1.0, float(self.correlation.sum()))
 
     @property
     def normal_world(self) -> FloatArray:
@@ -126,8 +135,8 @@ def fit_table(
             f"world, more than {np.degrees(max_tilt):.0f} deg: the calibration is off"
         )
     rms = float(np.sqrt(np.mean(residual[inlier] ** 2)))
-    area = _correlation_area(frame, normal, offset, noise)
-    return Table(normal, offset, rms, noise, area, frame.T_world_camera)
+    correlation = _autocorrelation(frame, normal, offset, noise)
+    return Table(normal, offset, rms, noise, correlation, frame.T_world_camera)
 
 
 def _grid_of_points(frame: DepthFrame) -> FloatArray:
@@ -182,29 +191,21 @@ def _dot(points: FloatArray, v: FloatArray) -> FloatArray:
     return result
 
 
-def _correlation_area(frame: DepthFrame, normal: FloatArray, offset: float, noise: float) -> float:
-    """Sum of the autocorrelation of the table's residuals over neighboring pixels [pixel]."""
-    reach = 8
-    height, width = frame.depth.shape
-    row, column = slice(0, height - height % 2), slice(0, width)
-    middle = frame.depth[row, column][:: max(1, height // 160)].astype(float)
-    rows = np.arange(0, height - height % 2, max(1, height // 160))
+def _autocorrelation(
+    frame: DepthFrame, normal: FloatArray, offset: float, noise: float
+) -> FloatArray:
+    """Correlation of the heights of neighboring pixels of the table."""
+    height = plane_heights(frame, normal, offset)
+    with np.errstate(invalid="ignore"):
+        on_table = np.abs(height) < 3 * noise
+    return autocorrelation(height, on_table)
+
+
+def plane_heights(frame: DepthFrame, normal: FloatArray, offset: float) -> NDArray[np.float32]:
+    """Height of every pixel above a plane, shape (H, W) [m]; NaN without a return."""
     k = frame.intrinsics
-    slope = (
-        normal[0] * (np.arange(width) - k.cx)[None, :] / k.fx
-        + normal[1] * (rows - k.cy)[:, None] / k.fy
-        + normal[2]
-    )
-    residual = middle * slope - offset
-    residual[~(np.abs(residual) < 3 * noise)] = np.nan
-    variance = float(np.nanmean(residual**2)) if np.isfinite(residual).any() else 1.0
-    line = 1.0
-    for lag in range(1, reach + 1):
-        product = residual[:, lag:] * residual[:, :-lag]
-        if not np.isfinite(product).any():
-            break
-        correlation = float(np.nanmean(product)) / variance
-        if correlation < 0.05:
-            break
-        line += 2.0 * correlation
-    return line**2
+    across = (normal[0] * (np.arange(k.width) - k.cx) / k.fx).astype(np.float32)
+    down = (normal[1] * (np.arange(k.height) - k.cy) / k.fy + normal[2]).astype(np.float32)
+    height: NDArray[np.float32] = frame.depth * (across[None, :] + down[:, None])
+    height -= np.float32(offset)
+    return height

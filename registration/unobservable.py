@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 
 from reach.arrays import FloatArray
@@ -10,22 +12,32 @@ from reach.transforms import make_transform, rotation_about, skew
 OPEN = 3e-3
 """A direction is open if its standard deviation moves the part's rim by more than this [m]."""
 _AXES = ("x", "y", "z")
-
-
 CONFIDENCE = 2.33
 """Standard deviations within which 98 % of a direction's errors lie."""
-FAR = 3.0
-"""An open direction is followed no further than so many times what is known well enough."""
+STEPS = (1.0, 1.5, 2.0, 3.0)
+"""An open direction is followed so many times as far as what is known well enough: further off it
+is another pose no less, and the covariance no longer holds."""
 
 
-def open_ends(
+@dataclass(frozen=True, slots=True, eq=False)
+class OpenWay:
+    """One way along which the pose may be further off than is known well enough.
+
+    Args:
+        poses: ever further along it, shape (K, 4, 4).
+    """
+
+    poses: FloatArray
+
+
+def open_ways(
     T: FloatArray, covariance: FloatArray, com: FloatArray, max_turn: float, max_shift: float
-) -> FloatArray:
-    """Poses at both ends of what the image leaves open, shape (K, 4, 4).
+) -> tuple[OpenWay, ...]:
+    """Both ways along each principal direction that the covariance leaves open.
 
     A pose that is known to within the limits has none. Along a direction that is known less well,
-    the ends are where the pose would be if its error there were as large as it may well be, with
-    the other directions following as the covariance says.
+    the poses begin at the limit and end where the pose would be if its error there were as large
+    as it may well be, with the other directions following as the covariance says.
 
     Args:
         T: pose, shape (4, 4).
@@ -37,16 +49,21 @@ def open_ends(
     to_com = np.eye(6)
     to_com[3:, :3] = -skew(com)
     about_com = to_com @ covariance @ to_com.T
-    ends = []
+    ways = []
     for part, limit in ((slice(0, 3), max_turn), (slice(3, 6), max_shift)):
         values, vectors = np.linalg.eigh(about_com[part, part])
         for value, vector in zip(values, vectors.T, strict=True):
             reach = CONFIDENCE * np.sqrt(value)
-            if reach > limit:
-                # Further off it is another pose no less, and the covariance no longer holds.
-                step = about_com[:, part] @ vector / value * min(reach, FAR * limit)
-                ends += [T @ _moved(sign * step, com) for sign in (1, -1)]
-    return np.array(ends).reshape(-1, 4, 4)
+            if reach <= limit:
+                continue
+            unit = about_com[:, part] @ vector / value
+            lengths = [step * limit for step in STEPS if step * limit < reach]
+            lengths = (lengths + [reach])[: len(STEPS)]
+            ways += [
+                OpenWay(np.stack([T @ _moved(sign * way * unit, com) for way in lengths]))
+                for sign in (1, -1)
+            ]
+    return tuple(ways)
 
 
 def _moved(step: FloatArray, com: FloatArray) -> FloatArray:

@@ -3,6 +3,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from reach import GraspObject
 from reach.symmetry import symmetry
 from reach.transforms import exp, make_transform, rotation_about
 from registration.grasp_symmetry import same_grasp
@@ -14,6 +15,15 @@ GRASP = exp([0.4, -0.2, 0.9, 0.01, 0.03, -0.02])
 def about_center(obj, axis, angle):
     R = rotation_about(axis, angle)
     return make_transform(R, obj.com - R @ obj.com)
+
+
+@pytest.fixture
+def nearly_round():
+    """An ellipsoid whose radii are 18, 15.5 and 17 mm."""
+    import trimesh
+
+    ball = trimesh.creation.icosphere(4).vertices * np.array([0.018, 0.0155, 0.017])
+    return GraspObject("ellipsoid", ball, trimesh.creation.icosphere(4).faces, 0.03)
 
 
 def registered(T_world_object, rivals) -> Registration:
@@ -80,6 +90,14 @@ def test_a_turned_mug_is_another_grasp(parts):
     assert not found.same_grasp_outcome(mug, GRASP)
     # Grasped from above along the axis, the handle's place does not matter to the tolerances.
     assert found.same_grasp_outcome(mug, GRASP, max_turn=np.pi, max_shift=1.0)
+
+
+def test_a_turn_that_no_gripper_notices_is_the_same_grasp(nearly_round):
+    T = exp([0.0, 0.0, 0.2, 0.3, 0.1, 0.0])
+    for angle, noticed in ((0.2, False), (1.2, True)):
+        found = registered(T, [T @ about_center(nearly_round, (0, 0, 1), angle)])
+        assert found.same_grasp_outcome(nearly_round, GRASP) is not noticed
+        assert not found.same_grasp_outcome(nearly_round, GRASP, max_surface=0.0)
 
 
 def test_what_is_ambiguous_or_contradicts_is_not_accepted():
