@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import json
 import sys
-from contextlib import ExitStack
+from collections.abc import Iterator
+from contextlib import ExitStack, contextmanager
 from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
@@ -37,8 +38,8 @@ def conduct(asked: Conduct) -> None:
         folder, setup, station = reopen_session(asked)
     else:
         folder, setup, station = create_session(asked, terminal)
-    with station:
-        _run(asked, folder, setup, station, terminal)
+    _run(asked, folder, setup, station, terminal)
+    _sum_up(asked, folder, terminal)
 
 
 def show_plan(asked: Conduct) -> None:
@@ -79,28 +80,37 @@ def _run(
     if asked.resume:
         for finding in recover_session(folder.path).findings:
             terminal.print(f"{finding.place}: {finding.text}", markup=False)
-    stored = folder.open_journal()
-    state = SessionState.fold(folder.descriptor.trials, stored.entries)
-    journal = MirroredJournal(stored, AnnotationMirror(folder, stored.entries))
-    controller = SessionController(
-        journal,
-        state,
-        stop=lambda: stop_station(station),
-        trials_left=lambda: trials_left(folder.trials),
-    )
-    auto = setup.options.operator == "auto"
+    # The session's writer first: who is refused here has not spoken to the robot of the other.
+    with folder.open_journal() as stored, station:
+        state = SessionState.fold(folder.descriptor.trials, stored.entries)
+        journal = MirroredJournal(stored, AnnotationMirror(folder, stored.entries))
+        controller = SessionController(
+            journal,
+            state,
+            stop=lambda: stop_station(station),
+            trials_left=lambda: trials_left(folder.trials),
+        )
+        with _closing(controller, state):
+            open_segment(
+                stored,
+                state,
+                fingerprints(station, setup.plan),
+                operator=asked.sitting.person,
+                source=(
+                    Source.OPERATOR_SIM if setup.options.operator == "auto" else Source.OPERATOR
+                ),
+                accept=asked.accepted,
+            )
+            _lead(asked.sitting, folder, setup, station, controller, journal, terminal)
+
+
+@contextmanager
+def _closing(controller: SessionController, state: SessionState) -> Iterator[None]:
+    """Write into the journal how the session ended, and why if it failed."""
     status: Literal["finished", "ended", "failed"] = "failed"
     reason = ""
     try:
-        open_segment(
-            stored,
-            state,
-            fingerprints(station, setup.plan),
-            operator=asked.sitting.person,
-            source=Source.OPERATOR_SIM if auto else Source.OPERATOR,
-            accept=asked.accepted,
-        )
-        _lead(asked.sitting, folder, setup, station, controller, journal, terminal)
+        yield
         whole = state.next_work() is None and not controller.ending
         status = "finished" if whole else "ended"
     except ReachError as error:
@@ -109,9 +119,11 @@ def _run(
     except KeyboardInterrupt:
         status, reason = "ended", "interrupted"
         raise
+    except Exception as error:
+        reason = f"{type(error).__name__}: {error}"
+        raise
     finally:
         controller.close(status, reason)
-    _sum_up(asked, folder, terminal)
 
 
 def _lead(

@@ -73,6 +73,12 @@ class NotInAutoError(RobotError):
     recovery = Recovery.HALT
 
 
+class ControllerTakenError(RobotError):
+    """Another process of this computer leads the arm."""
+
+    recovery = Recovery.HALT
+
+
 class MotorsOffError(RobotError):
     """The motors are off."""
 

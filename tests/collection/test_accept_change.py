@@ -26,7 +26,9 @@ def opened(out):
 @pytest.fixture
 def half_done(tmp_path, capsys):
     """A session with one trial of two done, whose station was calibrated again since."""
-    text = resources.files("collection.station").joinpath("simulated.toml").read_text(encoding="utf-8")
+    text = (
+        resources.files("collection.station").joinpath("simulated.toml").read_text(encoding="utf-8")
+    )
     station, out = tmp_path / "lab.toml", tmp_path / "S"
     assert BEFORE in text
     station.write_text(text + FAULT)

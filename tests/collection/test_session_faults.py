@@ -12,7 +12,9 @@ from logs.session.folder import SessionFolder
 
 
 def station_with(folder, *faults):
-    text = resources.files("collection.station").joinpath("simulated.toml").read_text(encoding="utf-8")
+    text = (
+        resources.files("collection.station").joinpath("simulated.toml").read_text(encoding="utf-8")
+    )
     for kind, attempt in faults:
         text += f'\n[[simulation.faults]]\nkind = "{kind}"\nattempt = {attempt}\n'
     path = folder / "faulty.toml"

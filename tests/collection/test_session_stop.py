@@ -126,7 +126,9 @@ def test_a_stop_in_a_recovery_stands_and_the_session_goes_on_when_it_is_cleared(
     """A scripted collision brings the recovery; the stop falls into it."""
     from importlib import resources
 
-    text = resources.files("collection.station").joinpath("simulated.toml").read_text(encoding="utf-8")
+    text = (
+        resources.files("collection.station").joinpath("simulated.toml").read_text(encoding="utf-8")
+    )
     station = tmp_path / "lab.toml"
     station.write_text(text + '\n[[simulation.faults]]\nkind = "collision_stop"\nattempt = 1\n')
     console = Console(monkeypatch)

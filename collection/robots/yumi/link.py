@@ -17,6 +17,7 @@ from collection.errors import (
 )
 from collection.robots.stop_latch import StopLatch
 from collection.robots.yumi.config import YumiConfig
+from collection.robots.yumi.controller_lock import ControllerLock
 from collection.robots.yumi.diagnosis import not_ready
 from collection.robots.yumi.program import VERSION, RapidProgram
 from collection.robots.yumi.web_services import ControllerState, WebServices
@@ -46,6 +47,7 @@ class ControllerLink:
         )
         self._stop_line = self._session()
         self._stop_lock = threading.Lock()
+        self._lock: ControllerLock | None = None
         self._holders: set[str] = set()
         self._connecting = False
 
@@ -61,16 +63,20 @@ class ControllerLink:
         Raises:
             NotInAutoError, MotorsOffError, EmergencyStopError: a person has to act first.
             ConnectionLostError: the controller does not answer.
+            ControllerTakenError: another process leads the arm.
             StoppedError: the operator's stop stands; the program is not started.
             RobotError: our module is not loaded, in another version, or its task is inactive.
         """
         if not self._holders or holder in self._holders:
             self._connecting = True
             try:
+                if self._lock is None:
+                    self._lock = ControllerLock(self.config.url, self.task)
                 self._close()
                 self._open()
             except BaseException:
                 self._close()
+                self._let_go()
                 raise
             finally:
                 self._connecting = False
@@ -81,6 +87,7 @@ class ControllerLink:
         self._holders.discard(holder)
         if not self._holders:
             self._close()
+            self._let_go()
 
     def require(self, holder: str) -> RapidProgram:
         """The program, for a command of a connected device.
@@ -219,6 +226,11 @@ class ControllerLink:
         self.services.close()
         with self._stop_lock:
             self._stop_line.close()
+
+    def _let_go(self) -> None:
+        if self._lock is not None and not self._holders:
+            self._lock.release()
+            self._lock = None
 
     def _session(self) -> WebServices:
         config = self.config
