@@ -27,6 +27,8 @@ PAGES: Final = {
     "/": ("index.html", "text/html"),
     "/console.css": ("console.css", "text/css"),
     "/main.js": ("main.js", "text/javascript"),
+    "/about.js": ("about.js", "text/javascript"),
+    "/actions.js": ("actions.js", "text/javascript"),
     "/buttons.js": ("buttons.js", "text/javascript"),
     "/commands.js": ("commands.js", "text/javascript"),
     "/legend.js": ("legend.js", "text/javascript"),

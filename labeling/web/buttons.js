@@ -1,20 +1,23 @@
 // The buttons below: which there are now, which may be pressed, and what can be chosen by a digit.
 
+import { decisionWord } from "/actions.js";
 import { byId, element, redraw } from "/draw.js";
 
-export function drawActions(page, state, about, usable) {
+// `judging`: verdicts are taken; `usable`: everything else is.
+export function drawActions(page, state, about, usable, judging) {
   const { view } = page;
   const reviewing = view.mode === "review";
   const placing = view.trial?.phase === "PLACE_OBJECT" && !view.trial.placed && !reviewing && !page.relabel;
-  const may = (id, allowed) => { byId(id).disabled = !(usable && allowed && state !== "STOPPED" && state !== "ENDED"); };
+  const open = state !== "STOPPED" && state !== "ENDED";
+  const may = (id, allowed) => { byId(id).disabled = !(usable && allowed && open); };
   byId("do-placed").hidden = !placing;
   may("do-placed", placing && state === "PLACE_OBJECT");
   const choosing = state === "CONFIRM_POSE" && !about;
-  ["do-success", "do-failure", "do-rotated"].forEach((id) => { byId(id).hidden = placing || choosing; may(id, Boolean(about)); });
+  ["do-success", "do-failure", "do-rotated"].forEach((id) => { byId(id).hidden = placing || choosing; may(id, judging && Boolean(about)); });
   byId("do-rotated").setAttribute("aria-pressed", String(page.rotated));
-  const earlier = reviewing && !view.second && about?.label;
+  const earlier = reviewing && about?.label;
   may("do-undo", Boolean(view.undoable || earlier));
-  byId("undo-text").textContent = view.undoable ? `Undo ${view.undoable.kind} of ${view.undoable.number}`
+  byId("undo-text").textContent = view.undoable ? `Undo ${decisionWord(view.undoable.kind)} of ${view.undoable.number}`
     : earlier ? `Take back ${about.number}'s label …` : "Undo";
   const moving = view.trial?.phase === "EXECUTE";
   for (const id of ["do-redo", "do-skip"]) {

@@ -2,6 +2,8 @@
 
 import { byId, element, trialItem } from "/draw.js";
 
+const LOOK_MS = 400; // a second press meant for the trial before is over by then
+
 export class Review {
   constructor(link, onChange) {
     this.link = link;
@@ -10,12 +12,31 @@ export class Review {
     this.place = 0;
     this.foundBy = null;
     this.version = -1;
-    byId("filter").addEventListener("change", () => { this.place = 0; this.load(); });
+    this.asked = 0; // the newest question to the server: an older answer is old news
+    this.came = { trial: null, at: 0 }; // what is on the stage, and since when
+    byId("filter").addEventListener("change", (event) => {
+      if (event.target instanceof HTMLSelectElement) event.target.blur(); // else it keeps the keys
+      this.place = 0;
+      this.load();
+    });
+    byId("filter").addEventListener("keydown", (event) => { if (event.key === "Enter") event.target.blur(); });
     byId("filter").addEventListener("submit", (event) => event.preventDefault());
   }
 
   chosen() {
     return this.trials[this.place] ?? null;
+  }
+
+  // True for a moment after a trial came up: a press then was meant for the one before it.
+  justCame() {
+    return performance.now() - this.came.at < LOOK_MS;
+  }
+
+  notice() {
+    const trial = this.chosen()?.trial_id ?? null;
+    if (trial === this.came.trial) return;
+    this.came = { trial, at: performance.now() };
+    setTimeout(this.onChange, LOOK_MS + 1);
   }
 
   shown(view) {
@@ -37,8 +58,9 @@ export class Review {
   async load() {
     const wanted = new URLSearchParams();
     for (const [name, value] of new FormData(byId("filter"))) if (value) wanted.set(name, value);
+    const asked = ++this.asked;
     const found = await this.link.json(`/api/review?${wanted}`).catch(() => null);
-    if (!found) return;
+    if (!found || asked !== this.asked) return;
     const kept = this.chosen()?.trial_id;
     this.trials = found.trials;
     this.foundBy = found.found_by;
@@ -73,6 +95,7 @@ export class Review {
   }
 
   draw() {
+    this.notice();
     const items = this.trials.map((trial, index) => trialItem(trial, index === this.place, () => {
       this.place = index;
       this.draw();

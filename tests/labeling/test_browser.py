@@ -9,9 +9,10 @@ from typing import Any
 
 import pytest
 
+from labeling.commands import Actor
 from labeling.console import Console
 from labeling.server import ConsoleServer
-from logs.journal.events import Phase
+from logs.journal.events import Phase, Source
 from logs.journal.file import read_journal
 
 CHROMIUM = shutil.which("chromium")
@@ -21,6 +22,8 @@ FLAGS = (
     " --disable-dev-shm-usage --disable-quic --no-first-run --disable-background-networking"
     " --disable-component-update --disable-sync --window-size=1400,900"
 )
+
+BO = Actor("bo", Source.OPERATOR)
 
 pytestmark = [
     pytest.mark.browser,
@@ -75,13 +78,22 @@ class Page:
 
         ActionChains(self.driver).send_keys(*keys).perform()
 
+    def on_stage(self, number: str) -> None:
+        """Wait until a trial of a review is there and may be judged."""
+        self.wait(
+            "return document.getElementById('trial-number').textContent === arguments[0]"
+            " && !document.getElementById('do-success').disabled",
+            number,
+        )
+
     def element(self, identity: str) -> Any:
         return self.driver.find_element("id", identity)
 
 
 def labels(bench: Any) -> list[str]:
     entries = read_journal(bench.folder.journal_path)
-    return [e.event.kind for e in entries if e.event.kind in ("label", "relabel", "undo", "skip")]
+    told = ("label", "relabel", "second_label", "undo", "skip")
+    return [e.event.kind for e in entries if e.event.kind in told]
 
 
 @pytest.fixture
@@ -305,6 +317,9 @@ def test_the_recording_is_shown_and_its_keys_still_label(
     page.wait("return document.body?.dataset.started === 'true'")
     page.run("document.getElementById('canvas').focus(); window.focus()")
     assert page.run("return document.hasFocus()")
+    browser.switch_to.default_content()
+    page.on_stage("1")
+    browser.switch_to.frame("viewer")
     page.press("s")
     browser.switch_to.default_content()
     assert "trial 1 success" in page.receipt("stored")
@@ -327,14 +342,15 @@ def test_a_second_operators_review_offers_no_filter_by_verdict(
     choices = "[...document.querySelectorAll('#filter select, #filter input')]"
     offered = f"return {choices}.filter(one => one.offsetParent).map(one => one.name)"
     assert reviewing.run(offered) == ["object", "outcome", "margin_below", "disagrees_with"]
-    second = Page(reviewing.driver, serve(bench, mode="review", second=True).link)
+    second = Page(reviewing.driver, serve(bench, mode="review", second=True, actor=BO).link)
     second.wait("return document.querySelectorAll('#review-list li').length === 2")
     assert second.run(offered) == ["object", "margin_below"]
 
 
 def test_undo_in_a_review_walks_back_this_sitting_only(bench: Any, reviewing: Page) -> None:
+    reviewing.on_stage("1")
     reviewing.press("f", "1")
-    reviewing.wait("return document.getElementById('trial-number').textContent === '2'")
+    reviewing.on_stage("2")
     reviewing.press("s")
     reviewing.wait("return document.getElementById('undo-text').textContent.includes('of 2')")
     for trial in ("2", "1"):
@@ -352,6 +368,62 @@ def test_undo_in_a_review_walks_back_this_sitting_only(bench: Any, reviewing: Pa
     reviewing.press("t")
     reviewing.wait("return document.getElementById('do-rotated').ariaPressed === 'true'")
     assert labels(bench)[-3:] == ["relabel", "undo", "undo"]
+
+
+def test_a_second_press_is_not_a_verdict_on_the_trial_that_just_came_up(
+    bench: Any, reviewing: Page
+) -> None:
+    reviewing.on_stage("1")
+    reviewing.press("s")
+    reviewing.wait("return document.getElementById('trial-number').textContent === '2'")
+    reviewing.press("s")
+    assert "only just come up" in reviewing.receipt("refused")
+    reviewing.on_stage("2")
+    assert labels(bench) == ["label", "label", "relabel"]
+    reviewing.press("s")
+    reviewing.receipt("stored")
+    assert labels(bench) == ["label", "label", "relabel", "relabel"]
+
+
+def test_a_chosen_filter_leaves_the_keys_to_the_operator(bench: Any, reviewing: Page) -> None:
+    from selenium.webdriver.support.ui import Select
+
+    reviewing.element("filter").find_element("name", "object").click()
+    Select(reviewing.element("filter").find_element("name", "object")).select_by_value("cube")
+    reviewing.on_stage("2")
+    reviewing.press("f", "1")
+    reviewing.receipt("stored")
+    assert bench.trial(2).label.reason == "missed"
+    assert labels(bench)[-1] == "relabel"
+
+
+def test_a_second_operator_takes_back_their_last_verdict(
+    bench: Any, serve: Any, browser: Any
+) -> None:
+    bench.labelled("success")
+    bench.labelled("failure", reason="missed")
+    server = serve(bench, mode="review", second=True, actor=BO, sitting_since=bench.state.seq)
+    page = Page(browser, server.link)
+    marks = "[...document.querySelectorAll('#review-list .mark')].map(mark => mark.textContent)"
+    page.wait(f"return {marks}.join() === 'unlabeled,unlabeled'")
+    page.on_stage("1")
+    page.press("u")
+    assert "nothing to undo" in page.receipt("refused")
+    page.press("f", "1")
+    page.on_stage("2")
+    page.press("s")
+    page.wait("return document.getElementById('undo-text').textContent === 'Undo label of 2'")
+    page.wait(f"return {marks}.join() === 'failure: missed,success'")
+    page.press("u")
+    assert "trial 2: its label no longer holds" in page.receipt("stored")
+    page.wait(f"return {marks}.join() === 'failure: missed,unlabeled'")
+    page.on_stage("2")
+    page.press("f", "2")
+    page.wait(f"return {marks}.join() === 'failure: missed,failure: slipped on lift'")
+    first, second = (bench.trial(number).takes[0] for number in (1, 2))
+    assert [take.second_labels["bo"].outcome for take in (first, second)] == ["failure"] * 2
+    assert [take.label.outcome for take in (first, second)] == ["success", "failure"]
+    assert labels(bench)[2:] == ["second_label", "second_label", "undo", "second_label"]
 
 
 def test_an_earlier_label_is_taken_back_only_when_asked_on_its_trial(
@@ -405,7 +477,9 @@ def test_a_foreign_frame_s_keys_are_ignored(bench: Any, awaiting: Page) -> None:
     assert labels(bench) == []
 
 
-def test_a_remapped_key_labels(bench: Any, awaiting: Page) -> None:
+def test_a_remapped_key_labels_also_in_the_next_session(
+    bench: Any, serve: Any, awaiting: Page
+) -> None:
     awaiting.element("open-keys").click()
     awaiting.run(
         "[...document.querySelectorAll('#key-table tr')]"
@@ -417,7 +491,9 @@ def test_a_remapped_key_labels(bench: Any, awaiting: Page) -> None:
     awaiting.press("g")
     awaiting.receipt("stored")
     assert labels(bench) == ["label"]
-    awaiting.run("localStorage.clear()")
+    again = Page(awaiting.driver, serve(bench).link)  # another port, as tomorrow
+    assert again.run("return document.querySelector('kbd[data-key=success]').textContent") == "g"
+    again.run("document.cookie = 'reach-console-keys=%7B%7D; path=/'")
 
 
 def test_the_page_fits_a_tablet(bench: Any, awaiting: Page) -> None:
