@@ -34,6 +34,9 @@ COMMANDS: dict[str, str] = {
 """Command name -> module in collection.cli that holds a function of the same name."""
 
 
+_SYSTEM_LIBRARY = re.compile(r"(lib[\w.+-]+): cannot open shared object file")
+
+
 def build_app() -> typer.Typer:
     """Assemble the command line from one module a command."""
     app = typer.Typer(
@@ -106,6 +109,14 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return 0  # the reader of our output (head, less) has seen enough
     except OSError as error:
         return _complain(_of_the_system(error), 2)
+    except ImportError as error:
+        if (library := _SYSTEM_LIBRARY.match(str(error))) is None:
+            raise
+        return _complain(
+            f"the system library {library[1]} is missing;"
+            " as root: tests/install-system-packages runtime (names the Debian packages)",
+            2,
+        )
     except typer.TyperException as error:
         given = sys.argv[1:] if arguments is None else arguments
         return _complain(_naming_the_value(error.format_message(), given), 2)

@@ -27,9 +27,13 @@ def load_object(
         mass: [kg]; if None, that of a light print (see PrintSettings).
 
     Raises:
-        UnknownNameError: neither a built-in part nor a file.
+        UnknownNameError: neither a built-in part nor a file, or no such unit.
         InvalidMeshError: the file's mesh cannot be used.
     """
+    from reach.objects import MESH_UNITS
+
+    if mesh_unit not in MESH_UNITS:  # also where it is not needed: it travels with the session
+        raise UnknownNameError("mesh unit", mesh_unit, MESH_UNITS)
     name = str(name_or_path)
     if name in CATALOG:
         return _weighed(_built_in(name), mass)

@@ -42,7 +42,7 @@ class SessionOptions(BaseModel):
     grasps: Annotated[int, Field(ge=1)] = 25
     repeats: Annotated[int, Field(ge=1)] = 5
     operator: OperatorKind = "web"
-    seed: int = 0
+    seed: Annotated[int, Field(ge=0)] = 0
     session: Annotated[int, Field(ge=0)] = 0
     mesh_unit: str = "m"
     models: tuple[str, ...] = ANALYTIC_NAMES

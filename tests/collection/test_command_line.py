@@ -38,6 +38,8 @@ def collect(out, **options):
         ({"operator": "robot"}, ["robot", "'auto', 'web' or 'terminal'"]),
         ({"grasps": "0"}, ["--grasps", "0"]),
         ({"grasps": "many"}, ["many"]),
+        ({"seed": "-3"}, ["--seed", "-3"]),
+        ({"mesh_unit": "furlong"}, ["furlong", "mm"]),
         ({"accept_change": "calibration"}, ["--resume"]),
         ({"models": "reach,guess"}, ["--models", "guess", "settled-robust"]),
         ({"min_probability": "1.5"}, ["--min-probability", "1.5"]),
@@ -91,6 +93,15 @@ def test_an_open_mesh_is_refused(capsys, tmp_path):
 @pytest.mark.parametrize("command", ["status", "replay", "recover"])
 def test_no_session_there(capsys, tmp_path, command):
     assert "session" in refused(capsys, command, tmp_path / "nothing")
+
+
+def test_a_missing_system_library_is_named(capsys, tmp_path, monkeypatch):
+    def without(*_, **__):
+        raise ImportError("libEGL.so.1: cannot open shared object file: No such file or directory")
+
+    monkeypatch.setattr("collection.objects.load_objects", without)
+    line = refused(capsys, "objects", "--export", tmp_path / "D")
+    assert "libEGL.so.1" in line and "install-system-packages" in line
 
 
 def test_unknown_commands_and_options(capsys):
