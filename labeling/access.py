@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ipaddress
 import secrets
+import ssl
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
@@ -75,10 +76,13 @@ def make_access(
         key: its private key (PEM).
 
     Raises:
-        UnsafeAddressError: if others could reach the console without a token and TLS.
+        UnsafeAddressError: if others could reach the console without a token and TLS, or the
+            certificate and its key cannot be used.
     """
     if (certificate is None) != (key is None):
         raise UnsafeAddressError("TLS needs both a certificate and its key")
+    if certificate is not None and key is not None:
+        _check_pair(certificate, key)
     if not is_loopback(host) and (token is None or certificate is None):
         raise UnsafeAddressError(
             f"the console on {host} could be reached by others: give a token and a TLS"
@@ -89,6 +93,19 @@ def make_access(
             f"a token of {len(token)} characters can be guessed; use 16 or more"
         )
     return Access(host, port, token or secrets.token_urlsafe(24), certificate, key)
+
+
+def _check_pair(certificate: Path, key: Path) -> None:
+    """Look at the files before a session begins that could not serve its page."""
+    for path in (certificate, key):
+        if not path.is_file():
+            raise UnsafeAddressError(f"{path} is no file")
+    try:
+        ssl.SSLContext(ssl.PROTOCOL_TLS_SERVER).load_cert_chain(certificate, key, password="")
+    except (OSError, ValueError) as error:
+        raise UnsafeAddressError(
+            f"{certificate} and {key} are no certificate and its unencrypted key: {error}"
+        ) from error
 
 
 def is_loopback(host: str) -> bool:

@@ -19,7 +19,8 @@ def pose_table(plan: Plan, objects: Iterable[GraspObject]) -> Table:
     from collection.plan.placing import how_it_lies
 
     by_name = {part.name: part for part in objects}
-    table = Table(title=f"{len(plan.grasps)} grasps of {len(plan.objects)} objects", box=None)
+    parts = f"{len(plan.objects)} object{'s' * (len(plan.objects) > 1)}"
+    table = Table(title=f"{len(plan.grasps)} grasps of {parts}", box=None)
     for heading in ("object", "pose", "%", "grasps", "how it lies"):
         table.add_column(heading, no_wrap=heading != "how it lies")
     for part in plan.objects:

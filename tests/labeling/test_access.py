@@ -185,8 +185,11 @@ def test_the_link_keeps_its_token_in_the_fragment() -> None:
 
 
 @pytest.mark.parametrize("host", ["0.0.0.0", "::", "192.168.1.5", "lab.example"])
-def test_another_address_needs_a_token_and_tls(host: str, tmp_path: Path) -> None:
-    pair = {"certificate": tmp_path / "c.pem", "key": tmp_path / "k.pem"}
+def test_another_address_needs_a_token_and_tls(
+    host: str, make_certificate: Any, tmp_path: Path
+) -> None:
+    certificate, key = make_certificate(tmp_path)
+    pair = {"certificate": certificate, "key": key}
     for given in ({}, {"token": "x" * 20}, pair):
         with pytest.raises(UnsafeAddressError, match="ssh -L"):
             make_access(host, 8000, **given)  # type: ignore[arg-type]
@@ -203,6 +206,16 @@ def test_a_short_token_and_half_a_certificate_are_refused(tmp_path: Path) -> Non
         make_access("127.0.0.1", 8000, token="1234")
     with pytest.raises(UnsafeAddressError, match="both"):
         make_access("127.0.0.1", 8000, certificate=tmp_path / "c.pem")
+
+
+def test_files_that_make_no_tls_are_refused_before_anything_begins(
+    make_certificate: Any, tmp_path: Path
+) -> None:
+    certificate, key = make_certificate(tmp_path)
+    with pytest.raises(UnsafeAddressError, match=r"nowhere\.pem is no file"):
+        make_access("127.0.0.1", 8000, certificate=certificate, key=tmp_path / "nowhere.pem")
+    with pytest.raises(UnsafeAddressError, match="no certificate and its unencrypted key"):
+        make_access("127.0.0.1", 8000, certificate=key, key=certificate)
 
 
 def test_tls_is_spoken_with_a_certificate(
