@@ -129,7 +129,7 @@ def _agreement(sources: Sequence[Path]) -> OperatorAgreement | None:
     if not sessions:
         return None
     found = joint_agreement(SessionFolder.open(path).read_state() for path in sessions)
-    return OperatorAgreement(found.pairs, found.agreed, found.kappa)
+    return OperatorAgreement(found.pairs, found.agreed, found.kappa, found.interval)
 
 
 def check_targets(paths: Iterable[Path | None]) -> None:

@@ -100,15 +100,8 @@ def _wait_for_interrupt() -> None:
 
 
 def _print_agreement(session: Path, *, as_json: bool) -> None:
-    from labeling.agreement import operator_agreement
+    from labeling.agreement import describe, operator_agreement
     from logs.session.folder import SessionFolder
 
     found = operator_agreement(SessionFolder.open(session).read_state())
-    if as_json:
-        print(json.dumps(asdict(found)))
-        return
-    kappa = "undefined" if found.kappa is None else f"{found.kappa:.3f}"
-    print(
-        f"{found.agreed} of {found.pairs} pairs of blind verdicts on {found.trials} trials agree,"
-        f" Cohen's kappa {kappa}"
-    )
+    print(json.dumps(asdict(found)) if as_json else describe(found))
