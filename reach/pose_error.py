@@ -10,6 +10,9 @@ from reach.arrays import FloatArray, frozen_finite, positive
 from reach.errors import InvalidInputError
 from reach.transforms import exp
 
+ANY_TURN = 1.0
+"""A turn with a larger standard deviation than this may be any: about an axis of symmetry [rad]."""
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PoseError:
@@ -47,6 +50,17 @@ class PoseError:
     def __add__(self, other: PoseError) -> PoseError:
         """Return the error of two independent causes together."""
         return PoseError(self.covariance + other.covariance)
+
+    def without_free_turns(self) -> PoseError:
+        """Return the error without turns that nothing tells, as of a round part about its axis.
+
+        Registration states such a turn's variance as that of a full turn. No contact model can
+        tell it either, and a sum or a mean over parts would be about nothing else.
+        """
+        variances, directions = np.linalg.eigh(self.covariance)
+        known = np.where(variances < ANY_TURN**2, variances, 0.0)
+        covariance = (directions * known) @ directions.T
+        return PoseError(0.5 * (covariance + covariance.T))
 
     def __eq__(self, other: object) -> bool:
         return isinstance(other, PoseError) and np.array_equal(self.covariance, other.covariance)

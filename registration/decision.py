@@ -8,9 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from reach.symmetry import pose_distance
-from registration.evidence import Evidence, compare
 from registration.job import Job
-from registration.polish import PRINT_ERROR
 from registration.refine import NEAR, fit_of
 from registration.search import Hypothesis
 from registration.unobservable import open_ways
@@ -99,7 +97,7 @@ def _refuted(job: Job, declared: Hypothesis, other: Hypothesis) -> bool:
         return False
     if declared.search is not other.search:
         return declared.cost > other.cost + CLEARLY_WORSE / 2
-    return float(_evidence(job, other, [declared]).margin[0]) > REFUTED
+    return float(job.weigh(other, [declared]).margin[0]) > REFUTED
 
 
 def _winner(job: Job, near: Sequence[Hypothesis]) -> Hypothesis:
@@ -107,8 +105,10 @@ def _winner(job: Job, near: Sequence[Hypothesis]) -> Hypothesis:
     best = near[0]
     for _ in range(len(near)):
         others = [h for h in near if h is not best and h.search is best.search]
-        odds = _evidence(job, best, others).log_odds
-        if len(odds) == 0 or odds.min() >= 0:
+        if not others:
+            break
+        odds = job.weigh(best, others).log_odds
+        if odds.min() >= 0:
             break
         best = others[int(np.argmin(odds))]
     return best
@@ -117,11 +117,13 @@ def _winner(job: Job, near: Sequence[Hypothesis]) -> Hypothesis:
 def _rivals(job: Job, chosen: Hypothesis, found: Sequence[Hypothesis]) -> list[RatedRival]:
     near = [h for h in found if h.cost <= chosen.cost + CLEARLY_WORSE]
     here = [h for h in near if h.search is chosen.search and _differ(job, chosen, h)]
-    evidence = _evidence(job, chosen, here)
-    rated = [
-        RatedRival(h, float(margin), float(odds), _rules_out(job, float(margin), float(odds)))
-        for h, margin, odds in zip(here, evidence.margin, evidence.log_odds, strict=True)
-    ]
+    rated = []
+    if here:
+        evidence = job.weigh(chosen, here)
+        rated = [
+            RatedRival(h, float(margin), float(odds), _rules_out(job, float(margin), float(odds)))
+            for h, margin, odds in zip(here, evidence.margin, evidence.log_odds, strict=True)
+        ]
     # Another thing on the table that the part explains as well: which one is meant, no pixel
     # can tell.
     rated += [
@@ -151,7 +153,9 @@ def _open_ends(job: Job, chosen: Hypothesis) -> list[RatedRival]:
     for way in ways:
         poses = [replace(chosen, T_camera_object=T, polished=None) for T in way.poses]
         poses = [pose for pose in poses if _differ(job, chosen, pose)]
-        evidence = _evidence(job, chosen, poses)
+        if not poses:
+            continue
+        evidence = job.weigh(chosen, poses)
         open_still = np.flatnonzero(evidence.log_odds < KNOWN)
         if len(open_still) == 0:
             continue
@@ -165,19 +169,6 @@ def _open_ends(job: Job, chosen: Hypothesis) -> list[RatedRival]:
 def _rules_out(job: Job, margin: float, log_odds: float) -> bool:
     """The noise could not have turned one pose's image into the other's, nor could a few pixels."""
     return margin >= job.profile.min_margin and log_odds >= ENOUGH
-
-
-def _evidence(job: Job, first: Hypothesis, others: Sequence[Hypothesis]) -> Evidence:
-    poses = np.stack([h.T_camera_object for h in (first, *others)])
-    search = first.search
-    return compare(
-        job.model,
-        search.seen,
-        poses,
-        tolerance=search.fine_tolerance,
-        noise=search.depth_noise,
-        bias=float(np.hypot(job.profile.bias, PRINT_ERROR)),
-    )
 
 
 def _differ(job: Job, a: Hypothesis, b: Hypothesis) -> bool:

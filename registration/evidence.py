@@ -53,51 +53,65 @@ class _Prediction:
     slope: FloatArray
 
 
-def compare(
-    model: MeshModel,
-    seen: Observation,
-    T_camera_object: FloatArray,
-    *,
-    tolerance: float,
-    noise: float,
-    bias: float,
-) -> Evidence:
-    """Weigh the first pose against each of the others, pixel by pixel.
+class Weigher:
+    """Weighs poses against each other in one image; what a pose predicts is rendered once.
 
-    The log odds follow from S, the summed difference of squared residuals. Were the first pose
-    true, S would be normal about mu = sum d^2, with d the poses' difference in depth; were the
-    other true, about -mu. Its variance is 4 v, hence S mu / (2 v). In v is what the noise,
-    correlated as on the table, makes of sum d e; what depths err beyond it, at edges above all;
-    and the bias that all depths share.
+    The log odds of two poses follow from S, the summed difference of squared residuals. Were the
+    first pose true, S would be normal about mu = sum d^2, with d the poses' difference in depth;
+    were the other true, about -mu. Its variance is 4 v, hence S mu / (2 v). In v is what the
+    noise, correlated as on the table, makes of sum d e; what depths err beyond it, at edges above
+    all; and the bias that all depths share.
 
     Args:
         model: of the part.
         seen: the image's window.
-        T_camera_object: shape (N + 1, 4, 4).
         tolerance: residuals are cut off here [m].
         noise: standard deviation of a depth [m].
         bias: standard deviation of the error that all depths share [m].
     """
-    stride = max(1, int(np.sqrt(len(seen.points) / PIXELS)))
-    rendered = render(model, seen, T_camera_object, seen.rays(stride), stride)
-    predictions = _predictions(seen, rendered, stride)
-    correlation = seen.table.correlation
-    few = max(FEW_PIXELS * max(1.0, seen.table.correlation_area / 4) / stride**2, FEW_PIXELS / 2)
-    count = len(predictions) - 1
-    margin, log_odds = np.zeros(count), np.zeros(count)
-    for i, other in enumerate(predictions[1:]):
-        own, rival = _residuals(predictions[0], other, tolerance)
-        gain = rival**2 - own**2
-        differing = float(np.minimum(1.0, 2 * np.abs(gain) / tolerance**2).sum())
-        margin[i] = gain.sum() / tolerance**2 / (differing + few)
-        apart = rival - own
-        at_edge = np.maximum(np.abs(own), np.abs(rival)) >= tolerance
-        errs = np.where(at_edge, EDGE_NOISE, FACE_NOISE) * apart**2
+
+    def __init__(
+        self, model: MeshModel, seen: Observation, *, tolerance: float, noise: float, bias: float
+    ) -> None:
+        self._model, self._seen = model, seen
+        self._tolerance, self._noise, self._bias = tolerance, noise, bias
+        self._stride = max(1, int(np.sqrt(len(seen.points) / PIXELS)))
+        area = seen.table.correlation_area
+        few = FEW_PIXELS * max(1.0, area / 4) / self._stride**2
+        self._few = max(few, FEW_PIXELS / 2)
+        self._known: dict[bytes, _Prediction] = {}
+
+    def weigh(self, T_camera_object: FloatArray, others: FloatArray) -> Evidence:
+        """Evidence for a pose (4, 4) against each of N others (N, 4, 4)."""
+        self._predict(np.concatenate([T_camera_object[None], others]))
+        own = self._known[T_camera_object.tobytes()]
+        pairs = [self._against(own, self._known[T.tobytes()]) for T in others]
+        return Evidence(*np.array(pairs).reshape(-1, 2).T)
+
+    def _predict(self, poses: FloatArray) -> None:
+        new = {T.tobytes(): T for T in poses if T.tobytes() not in self._known}
+        if new:
+            T, rays = np.stack(list(new.values())), self._seen.rays(self._stride)
+            rendered = render(self._model, self._seen, T, rays, self._stride)
+            found = _predictions(self._seen, rendered, self._stride)
+            self._known.update(zip(new, found, strict=True))
+
+    def _against(self, own: _Prediction, other: _Prediction) -> tuple[float, float]:
+        """Margin and log odds of one pose against another."""
+        own_residual, rival = _residuals(own, other, self._tolerance)
+        gain = rival**2 - own_residual**2
+        full = self._tolerance**2
+        differing = float(np.minimum(1.0, 2 * np.abs(gain) / full).sum())
+        margin = float(gain.sum()) / full / (differing + self._few)
+        apart = rival - own_residual
         mu = float((apart**2).sum())
-        v = noise**2 * (variance_of_sum(apart, correlation, stride) + float(errs.sum()))
-        v += (bias * float(apart.sum())) ** 2
-        log_odds[i] = gain.sum() * mu / (2 * v) if mu > 0 else 0.0
-    return Evidence(margin, log_odds)
+        if mu == 0.0:
+            return margin, 0.0
+        at_edge = np.maximum(np.abs(own_residual), np.abs(rival)) >= self._tolerance
+        extra = float((np.where(at_edge, EDGE_NOISE, FACE_NOISE) * apart**2).sum())
+        noise = variance_of_sum(apart, self._seen.table.correlation, self._stride) + extra
+        v = self._noise**2 * noise + (self._bias * float(apart.sum())) ** 2
+        return margin, float(gain.sum()) * mu / (2 * v)
 
 
 def _residuals(a: _Prediction, b: _Prediction, tolerance: float) -> tuple[FloatArray, FloatArray]:

@@ -11,10 +11,12 @@ import numpy as np
 from reach.objects import GraspObject
 from reach.stable_poses import StablePose, stable_poses
 from reach.symmetry import symmetry
+from registration.evidence import Evidence, Weigher
 from registration.frame import DepthFrame
 from registration.mesh_model import mesh_model
 from registration.observation import Scan, scan
 from registration.options import RegistrationOptions
+from registration.polish import PRINT_ERROR
 from registration.search import Hypothesis, Search
 from registration.table import fit_table
 
@@ -38,6 +40,7 @@ class Job:
     ) -> None:
         self.obj, self.frame, self.options, self.seed = obj, frame, options, seed
         self.timings: dict[str, float] = {}
+        self._weighers: dict[int, Weigher] = {}
         self.profile = options.profile_for(frame)
         with self.timed("prepare"):
             self.model = mesh_model(obj)
@@ -95,6 +98,22 @@ class Job:
     def anywhere(self, stage: str) -> list[Hypothesis]:
         """Search all orientations over all groups of components, by rising cost."""
         return self._run(self.groups, lambda search: search.anywhere(), stage)
+
+    def weigh(self, first: Hypothesis, others: Sequence[Hypothesis]) -> Evidence:
+        """Evidence for a hypothesis against others of the same search, at least one."""
+        search = first.search
+        weigher = self._weighers.get(id(search.seen))
+        if weigher is None:
+            weigher = self._weighers[id(search.seen)] = Weigher(
+                self.model,
+                search.seen,
+                tolerance=search.fine_tolerance,
+                noise=search.depth_noise,
+                bias=float(np.hypot(self.profile.bias, PRINT_ERROR)),
+            )
+        return weigher.weigh(
+            first.T_camera_object, np.stack([other.T_camera_object for other in others])
+        )
 
     def _run(
         self,

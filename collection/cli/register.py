@@ -140,6 +140,8 @@ def registration_json(part: GraspObject, found: Registration) -> dict[str, Any]:
 def _print(part: GraspObject, found: Registration) -> None:
     import numpy as np
 
+    from reach.pose_error import PoseError
+
     verdict = (
         "stands otherwise than declared"
         if found.contradicts_declared
@@ -147,7 +149,7 @@ def _print(part: GraspObject, found: Registration) -> None:
         if found.ambiguous
         else "accepted"
     )
-    spread = np.sqrt(np.diag(found.covariance))
+    spread = np.sqrt(np.diag(PoseError(found.covariance).without_free_turns().covariance))
     typer.echo(f"{part.name}: {verdict}, stable pose {found.stable_pose}")
     typer.echo(f"render cost {found.render_cost:.3f}, margin {found.margin:.2f}")
     typer.echo("T_world_object:")

@@ -47,8 +47,8 @@ class Execution:
 
     Args:
         T_world_object: registered pose, shape (4, 4).
-        covariance: of it, shape (6, 6), (rotation [rad], translation [m]), object frame; infinite
-            in a direction that the image does not tell.
+        covariance: of it, shape (6, 6), (rotation [rad], translation [m]), object frame; a
+            turn about an axis of symmetry has the variance of a full turn.
         T_world_gripper: measured when the jaws had closed, shape (4, 4).
         T_object_gripper: the grasp as executed on the registered object, shape (4, 4).
         jaw_width: between the pads at the end of the hold [m].
@@ -77,9 +77,9 @@ class Execution:
                 object.__setattr__(self, name, as_transform(value, name))
         if self.covariance is not None:
             covariance = frozen(self.covariance)
-            if covariance.shape != (6, 6) or np.any(np.isnan(covariance)):
+            if covariance.shape != (6, 6) or not np.isfinite(covariance).all():
                 raise InvalidInputError(
-                    f"pose covariance has shape {covariance.shape} or NaN, expected (6, 6) numbers"
+                    f"pose covariance has shape {covariance.shape}, expected (6, 6) finite numbers"
                 )
             object.__setattr__(self, "covariance", covariance)
 

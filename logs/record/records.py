@@ -146,7 +146,8 @@ class RegistrationRecord:
         time_ns: of the image [ns].
         T_world_object: shape (4, 4).
         T_camera_object: shape (4, 4).
-        covariance: shape (6, 6), (rotation [rad], translation [m]), object frame.
+        covariance: shape (6, 6), (rotation [rad], translation [m]), object frame; a turn about
+            an axis of symmetry has the variance of a full turn.
         stable_pose: index of the stable pose that was found, if any.
         ambiguous: a rival is too close to call.
         contradicts_declared: the image shows another stable pose than the plan.
@@ -175,9 +176,9 @@ class RegistrationRecord:
         set_field(self, "T_world_object", as_transform(self.T_world_object, "T_world_object"))
         set_field(self, "T_camera_object", as_transform(self.T_camera_object, "T_camera_object"))
         covariance = frozen(self.covariance)
-        if covariance.shape != (6, 6) or np.any(np.isnan(covariance)):
+        if covariance.shape != (6, 6) or not np.isfinite(covariance).all():
             raise InvalidInputError(
-                f"pose covariance has shape {covariance.shape} or NaN, expected (6, 6) numbers"
+                f"pose covariance has shape {covariance.shape}, expected (6, 6) finite numbers"
             )
         set_field(self, "covariance", covariance)
 

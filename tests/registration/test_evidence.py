@@ -9,21 +9,21 @@ from reach.stable_poses import stable_poses
 from reach.transforms import make_transform, rotation_about
 from registration import RegistrationOptions
 from registration.decision import ENOUGH
-from registration.evidence import compare
+from registration.evidence import Weigher
 from registration.job import Job
 
 
 def weighed(case, poses, noise=None, bias=3e-5):
     job = Job(case.obj, case.frame, RegistrationOptions(), seed=0)
     search = job.groups[0]
-    return compare(
+    weigher = Weigher(
         job.model,
         search.seen,
-        np.stack(poses),
         tolerance=search.fine_tolerance,
-        noise=noise or job.table.noise,
+        noise=noise or search.depth_noise,
         bias=bias,
     )
+    return weigher.weigh(poses[0], np.stack(poses[1:]))
 
 
 @pytest.fixture(scope="module")
