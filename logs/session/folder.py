@@ -24,6 +24,7 @@ from logs.journal.file import JOURNAL_NAME, Journal, encode_entry, read_journal
 from logs.journal.lock import SessionLock
 from logs.journal.state import PlannedEntry, SessionState
 from logs.trial_folder import TRIALS, take_folder
+from logs.unfinished_view import remove_abandoned_views
 
 SESSION_NAME = "session.json"
 PLAN_NAME = "plan.json"
@@ -154,7 +155,8 @@ class SessionFolder:
         return SessionLock(self.path)
 
     def open_journal(self, *, clock: Callable[[], int] = time.time_ns) -> Journal:
-        """Become the one writer of events."""
+        """Become the one writer of events; clears away what killed writers of views left."""
+        remove_abandoned_views(self.path)
         return Journal(self.journal_path, clock=clock)
 
     def read_state(self) -> SessionState:

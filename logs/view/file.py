@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from logs.errors import ViewError
+from logs.unfinished_view import unfinished_layout, unfinished_view
 
 _END = b"RRF2FOOT"
 _END_SIZE = len(_END) + 4
@@ -36,8 +37,7 @@ def view_file(
     import rerun as rr
 
     _free_earlier_recordings()
-    temporary = out.with_name(f".{out.name}.{os.getpid()}.part")
-    layout = temporary.with_suffix(".rbl")
+    temporary, layout = unfinished_view(out), unfinished_layout(out)
     recording: Any = rr.RecordingStream(application, recording_id=recording_id)
     # Rerun's own clocks say when the view was derived, which nobody asks.
     recording.set_log_time_enabled(False)
