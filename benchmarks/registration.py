@@ -5,8 +5,9 @@
 Every method sees the same images. Printed and written as JSON per sensor and method: ADD-S
 (mean surface distance below a tenth of the diameter), strict (surfaces within 2 mm, stereo 4;
 rotation up to symmetry below 5 degrees; center of mass within 2 mm, stereo 3), median errors,
-CPU time, and for ours how many right poses are accepted and how many wrong ones. Then wrong
-meshes, and the share of errors within the covariance's 90 % ellipsoid. Times are CPU time of
+CPU time, and for ours how many right poses are accepted and how many wrong ones, by category of
+part too: with many of them a trial may run unasked though the pose is not known as well. Then
+wrong meshes, and the share of errors within the covariance's 90 % ellipsoid. Times are CPU time of
 one process; preparation per mesh (cached) is left out.
 """
 
@@ -15,7 +16,8 @@ from __future__ import annotations
 import argparse
 import json
 import time
-from dataclasses import asdict, dataclass
+from collections.abc import Sequence
+from dataclasses import asdict
 from pathlib import Path
 
 import numpy as np
@@ -25,13 +27,20 @@ from benchmarks.registration_holdout import KINDS, holdout_part
 from benchmarks.registration_objects import PARTS, part
 from benchmarks.registration_rivals import METHODS
 from benchmarks.registration_scenes import CAMERAS, RegistrationCase, SceneSettings, make_case
-from collection.objects import load_object
+from benchmarks.registration_tables import (
+    Row,
+    category,
+    print_categories,
+    print_methods,
+    print_parts,
+)
+from collection.objects import OBJECT_NAMES, load_object
 from reach import GraspObject
 from reach.arrays import FloatArray
 from reach.stable_poses import stable_poses
 from reach.symmetry import pose_distance, symmetry
 from reach.transforms import inverse, log, make_transform, rotation_about
-from registration import RegistrationError, RegistrationOptions, register
+from registration import Registration, RegistrationError, RegistrationOptions, register
 from registration.job import Job
 from registration.mesh_model import mesh_model
 
@@ -43,58 +52,43 @@ OURS = {
 }
 
 
-@dataclass(frozen=True)
-class Row:
-    """One method on one image."""
-
-    method: str
-    sensor: str
-    part: str
-    case: int
-    refused: bool
-    accepted: bool
-    adds: bool
-    strict: bool
-    surface: float
-    rotation: float
-    translation: float
-    margin: float
-    cost: float
-    within90: bool
-    seconds: float
-
-
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument(
         "--parts", default=",".join(PARTS), help="names, built-in parts, or mesh files"
     )
     parser.add_argument(
-        "--holdout", type=int, help="instead: parts of every kind drawn anew from this seed"
+        "--holdout",
+        type=int,
+        help="instead: parts of every kind drawn anew from this seed, and the built-in parts",
     )
     parser.add_argument("--poses", type=int, default=10)
     parser.add_argument("--sensors", default=",".join(CAMERAS))
     parser.add_argument("--seed", type=int, default=1000)
     parser.add_argument("--wrong", type=int, default=100, help="images of another part")
     parser.add_argument("--only-ours", action="store_true")
+    parser.add_argument("--method", action="append", choices=OURS, help="of ours; all")
     parser.add_argument("--out", type=Path, default=Path("benchmarks/results/registration.json"))
     arguments = parser.parse_args()
     if arguments.holdout is None:
         objects = [_object(name) for name in arguments.parts.split(",")]
     else:
         objects = [holdout_part(kind, arguments.holdout) for kind in KINDS]
+        objects += [load_object(name) for name in OBJECT_NAMES]
     rows: list[Row] = []
     wrong: dict[str, dict[str, int]] = {}
+    _ours(make_case(objects[0], np.random.default_rng(0), SceneSettings()), 0, list(OURS))  # loads
     for sensor in arguments.sensors.split(","):
         for number, obj in enumerate(objects):
             for k in range(arguments.poses):
                 rng = np.random.default_rng([arguments.seed, number, k])
                 case = make_case(obj, rng, SceneSettings(sensor))
-                rows += _ours(case, k)
+                rows += _ours(case, k, arguments.method or list(OURS))
                 if not arguments.only_ours:
                     rows += _rivals(case, k)
-        _print_table(rows, sensor)
-        _print_parts(rows, sensor)
+        print_methods(rows, sensor, OURS)
+        print_categories(rows, sensor, OURS)
+        print_parts(rows, sensor, OURS)
         wrong[sensor] = _wrong_meshes(objects, sensor, arguments.wrong, arguments.seed)
         print(f"wrong mesh: {wrong[sensor]}\n", flush=True)
     arguments.out.parent.mkdir(parents=True, exist_ok=True)
@@ -106,11 +100,12 @@ def _object(name: str) -> GraspObject:
     return part(name) if name in PARTS else load_object(name, mass=0.05)
 
 
-def _ours(case: RegistrationCase, k: int) -> list[Row]:
+def _ours(case: RegistrationCase, k: int, methods: Sequence[str]) -> list[Row]:
     mesh_model(case.obj)
     stable_poses(case.obj)
     rows = []
-    for method, (mode, options) in OURS.items():
+    for method in methods:
+        mode, options = OURS[method]
         start = time.process_time()
         try:
             found = register(
@@ -133,6 +128,7 @@ def _ours(case: RegistrationCase, k: int) -> list[Row]:
                 seconds,
                 found.T_camera_object,
                 accepted=found.accepted,
+                unasked=unasked(case, found),
                 margin=found.margin,
                 cost=found.render_cost,
                 within90=within_ellipsoid(case, found.T_camera_object, found.covariance),
@@ -161,6 +157,7 @@ def _row(
     T: FloatArray | None,
     *,
     accepted: bool = True,
+    unasked: bool = True,
     margin: float = float("nan"),
     cost: float = float("nan"),
     within90: bool = False,
@@ -183,9 +180,11 @@ def _row(
         method,
         case.frame.sensor,
         case.obj.name,
+        category(case.obj.name),
         k,
         T is None,
         T is not None and accepted,
+        T is not None and unasked,
         adds < 0.1 * case.obj.diameter,
         bool(strict),
         surface,
@@ -196,6 +195,16 @@ def _row(
         within90,
         seconds,
     )
+
+
+def unasked(case: RegistrationCase, found: Registration) -> bool:
+    """Whether a trial may run unasked whose hand comes down on the center of mass."""
+    if found.contradicts_declared:
+        return False
+    T = found.T_world_object
+    down = rotation_about((1, 0, 0), np.pi)
+    T_world_gripper = make_transform(down, T[:3, :3] @ case.obj.com + T[:3, 3])
+    return found.accepted or found.same_grasp_outcome(case.obj, inverse(T) @ T_world_gripper)
 
 
 def within_ellipsoid(case: RegistrationCase, T: FloatArray, covariance: FloatArray) -> bool:
@@ -230,49 +239,6 @@ def _wrong_meshes(objects: list[GraspObject], sensor: str, count: int, seed: int
         except RegistrationError:
             outcome["refused"] += 1
     return outcome
-
-
-def _print_table(rows: list[Row], sensor: str) -> None:
-    print(
-        f"{sensor}\n{'method':42s} ADD-S strict  mm   deg  p50 ms p95 ms  right acc. wrong acc. in 90%"
-    )
-    for method in dict.fromkeys(row.method for row in rows):
-        mine = [row for row in rows if row.method == method and row.sensor == sensor]
-        right = [row for row in mine if row.strict]
-        seconds = np.array([row.seconds for row in mine]) * 1e3
-        line = (
-            f"{method:42s} {_share([row.adds for row in mine])} "
-            f"{_share([row.strict for row in mine])} "
-            f"{1e3 * np.median([row.translation for row in mine]):5.2f} "
-            f"{np.degrees(np.median([row.rotation for row in mine])):5.2f} "
-            f"{np.median(seconds):6.0f} {np.quantile(seconds, 0.95):6.0f}"
-        )
-        if method in OURS:
-            line += (
-                f"     {_share([row.accepted for row in right])}"
-                f"      {sum(row.accepted and not row.strict for row in mine):3d}"
-                f"    {_share([row.within90 for row in right])}"
-            )
-        print(line)
-
-
-def _print_parts(rows: list[Row], sensor: str) -> None:
-    """Ours, part by part, all modes together."""
-    print(f"{'part':24s} cases strict right acc. wrong acc. asked refused")
-    ours = [row for row in rows if row.sensor == sensor and row.method in OURS]
-    for name in dict.fromkeys(row.part for row in ours):
-        mine = [row for row in ours if row.part == name]
-        print(
-            f"{name:24s} {len(mine):5d} {_share([row.strict for row in mine])}     "
-            f"{_share([row.accepted for row in mine if row.strict])}"
-            f"      {sum(row.accepted and not row.strict for row in mine):4d} "
-            f"{sum(not row.accepted and not row.refused for row in mine):5d} "
-            f"{sum(row.refused for row in mine):7d}"
-        )
-
-
-def _share(flags: list[bool]) -> str:
-    return f"{100 * np.mean(flags):5.1f}" if flags else "    -"
 
 
 if __name__ == "__main__":

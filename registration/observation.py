@@ -120,11 +120,8 @@ class Scan:
     def _fits(self, group: list[int]) -> bool:
         """Whether components lie within the part's diameter of each other, about."""
         points = np.concatenate([self.components[i][::7] for i in group])
-        up = self.table.normal_camera
-        x = np.cross(up, (0.0, 0.0, 1.0))
-        x /= np.linalg.norm(x)
+        x, y = self.table.T_camera_table(points[0])[:3, :2].T
         allowed = self.diameter + 4e-3 + 4 * self.table.noise
-        y = np.cross(up, x)
         for angle in np.arange(4) * np.pi / 4:
             along = np.cos(angle) * x + np.sin(angle) * y
             extent = float(np.ptp((points * along).sum(axis=1)))

@@ -9,7 +9,8 @@ import pytest
 
 from reach.errors import InvalidInputError, UnknownNameError
 from reach.stable_poses import stable_poses
-from registration import RegistrationOptions, register
+from reach.transforms import make_transform
+from registration import DepthFrame, Intrinsics, RegistrationOptions, register
 
 EASY = ("bar_clamp", "bracket", "pawn", "gear", "pipe_tee", "chiral_stair")
 
@@ -136,6 +137,28 @@ def test_bad_requests_name_the_choices(parts, scenes):
         register(case.obj, case.frame, stable_pose=4)
     with pytest.raises(InvalidInputError, match="got None"):
         register(case.obj, case.frame)
+
+
+def test_a_camera_may_look_straight_down(parts):
+    camera = Intrinsics(400, 300, 1200.0, 1200.0, 199.5, 149.5)
+    T_world_camera = make_transform(np.diag([1.0, -1.0, -1.0]), (0.0, 0.0, 0.6))
+    rng = np.random.default_rng(0)
+    turn = np.radians(20)
+    for others in (0, 1):
+        depth = np.full((300, 400), 0.6)
+        for x in (0.0, 0.07)[: others + 1]:  # a cube, and half of one beside it
+            top = camera.rays()[..., :2] * 0.57 - (x, 0.0)
+            along = top @ [np.cos(turn), np.sin(turn)], top @ [-np.sin(turn), np.cos(turn)]
+            inside = (np.abs(along[0]) < 0.015) & (np.abs(along[1]) < (0.015 if x == 0 else 0.008))
+            depth[inside] = 0.57
+        noisy = (depth + 1e-4 * rng.normal(size=depth.shape)).astype(np.float32)
+        found = register(parts["cube"], DepthFrame(noisy, camera, T_world_camera), stable_pose=0)
+        center = found.T_world_object[:3, :3] @ parts["cube"].com + found.T_world_object[:3, 3]
+        np.testing.assert_allclose(center, (0.0, 0.0, 0.015), atol=3e-4)
+        sides = found.T_world_object[:2, :3]
+        yaw = np.degrees(np.arctan2(sides[1], sides[0])[np.linalg.norm(sides, axis=0) > 0.9])
+        assert np.abs((yaw + 20 + 45) % 90 - 45).max() < 1.0
+        assert found.accepted
 
 
 def test_calibration_error_moves_the_world_pose_only(parts, scenes, is_right):
