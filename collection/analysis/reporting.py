@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import os
 from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
@@ -12,7 +11,6 @@ from typing import TYPE_CHECKING
 from reach.errors import InvalidInputError
 
 if TYPE_CHECKING:
-    from collection.plan.coverage import Histogram
     from logs.report.agreement import OperatorAgreement
     from logs.report.coverage import PlanCoverage
     from reach.evaluation.table import Evaluation
@@ -92,30 +90,16 @@ def _covered(sources: Sequence[Path]) -> PlanCoverage | None:
     """What the plans of these sessions cover; None where a source is no session."""
     from collection.plan.coverage import coverage
     from collection.session.setup import read_setup
-    from logs.report.coverage import Bars, PlanCoverage
     from logs.session.folder import SESSION_NAME, SessionFolder
     from reach.gripper import ParallelJawGripper
 
     if not all((source / SESSION_NAME).exists() for source in sources):
         return None
     setups = [read_setup(SessionFolder.open(source)) for source in sources]
-    found = coverage(
+    return coverage(
         [grasp for setup in setups for grasp in setup.plan.grasps],
         {name: part for setup in setups for name, part in setup.objects.items()},
         ParallelJawGripper.yumi(),
-    )
-
-    def bars(title: str, histogram: Histogram, scale: float) -> Bars:
-        return Bars(title, tuple(edge * scale for edge in histogram.edges), histogram.counts)
-
-    return PlanCoverage(
-        found.grasps,
-        (
-            bars("approach angle [deg]", found.approach_angle, 180.0 / math.pi),
-            bars("width [mm]", found.width, 1e3),
-            bars("jitter offset [mm]", found.offset, 1e3),
-        ),
-        {kind.value: count for kind, count in found.contacts.items()},
     )
 
 

@@ -6,6 +6,8 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any
 
+from logs.report.numbers import number, signed, span
+
 if TYPE_CHECKING:
     from rich.table import Table
 
@@ -15,6 +17,7 @@ METRICS = ("ap", "ar", "f1", "mae", "brier")
 
 def evaluation_table(content: Mapping[str, Any]) -> list[Table]:
     """The tables of an evaluation's JSON content."""
+    from rich.box import SIMPLE_HEAD
     from rich.table import Table
 
     marked = " - simulated labels" if content["simulated"] else ""
@@ -22,7 +25,7 @@ def evaluation_table(content: Mapping[str, Any]) -> list[Table]:
         f"{content['trials']} trials of {content['grasps']} grasps on "
         f"{len(content['objects'])} objects{marked}"
     )
-    table = Table(title=title, title_justify="left", caption=_caption(content))
+    table = Table(title=title, title_justify="left", caption=_caption(content), box=SIMPLE_HEAD)
     for header in HEADERS:
         table.add_column(header, justify="left" if header == "model" else "right", no_wrap=True)
     references = set(content["references"])
@@ -54,11 +57,11 @@ def _gains_table(found: Sequence[Mapping[str, Any]]) -> Table:
         table.add_column(header, justify="left" if named else "right", no_wrap=not named)
     for gain in found:
         cells = [
-            _signed(gain["ar"]),
-            _span(gain["ar_interval"]),
-            _signed(gain["ap"]),
-            _span(gain["ap_interval"]),
-            {True: "yes", False: "no", None: "-"}[gain["as_published"]],
+            signed(gain["ar"]),
+            span(gain["ar_interval"], with_sign=True) or "–",
+            signed(gain["ap"]),
+            span(gain["ap_interval"], with_sign=True) or "–",
+            {True: "yes", False: "no", None: "–"}[gain["as_published"]],
         ]
         table.add_row(gain["model"], gain["rival"], *cells)
     return table
@@ -75,7 +78,7 @@ def _majority_table(content: Mapping[str, Any]) -> Table:
         table.add_column(header, justify="left" if header == "model" else "right", no_wrap=True)
     references = set(content["references"])
     for name, row in content["models"].items():
-        numbers = (_number(row["majority"][key]) for key in METRICS)
+        numbers = (number(row["majority"][key]) for key in METRICS)
         table.add_row(name, *numbers, style="dim" if name in references else None)
     return table
 
@@ -90,34 +93,21 @@ def print_table(tables: list[Table]) -> None:
 
 
 def _cells(name: str, row: Mapping[str, Any]) -> list[str]:
-    interval = row["intervals"]["ap"]
     return [
         name,
-        _number(row["ap"]),
-        f"{interval[0]:.2f}-{interval[1]:.2f}" if interval else "-",
-        *(_number(row[key]) for key in METRICS[1:]),
-        f"{row['seconds_per_grasp']:.2g}",
+        number(row["ap"]),
+        span(row["intervals"]["ap"]) or "–",
+        *(number(row[key]) for key in METRICS[1:]),
+        f"{row['seconds_per_grasp']:.2g}" if row["seconds_per_grasp"] else "–",
     ]
 
 
-def _number(value: float | None) -> str:
-    return "-" if value is None else f"{value:.3f}"
-
-
-def _signed(value: float | None) -> str:
-    return "-" if value is None else f"{value:+.2f}"
-
-
-def _span(bounds: Sequence[float] | None) -> str:
-    return "" if bounds is None else f"{bounds[0]:+.2f} {bounds[1]:+.2f}"
-
-
 def _caption(content: Mapping[str, Any]) -> str:
-    from logs.report.footnotes import ORACLE, footnotes
+    from logs.footnotes import ORACLE, footnotes
 
     error = content["pose_error"]
     text = (
-        f"Means over objects, 95 % bootstrap intervals. Pose error {error['translation'] * 1e3:.2f} "
+        f"Means over objects. {content['interval_note']} Pose error {error['translation'] * 1e3:.2f} "
         f"mm, {error['rotation']:.4f} rad ({error['basis']})."
     )
     without = content["objects_without_positive"]
@@ -140,7 +130,7 @@ def _cross_validation_table(content: Mapping[str, Any]) -> Table:
     depth = {True: "saturated", False: "unsaturated", None: ""}
     for name, variants in content["models"].items():
         for row in variants:
-            numbers = (_number(row[key]) for key in METRICS)
+            numbers = (number(row[key]) for key in METRICS)
             table.add_row(name, depth[row["saturated"]], *numbers)
     if content["exempt"]:
         table.caption = f"Parameters not drawn: {', '.join(content['exempt'])}."

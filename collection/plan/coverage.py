@@ -10,10 +10,10 @@ from enum import StrEnum
 from typing import Any
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict
 
 from collection.plan.records import PlannedGrasp
 from collection.sampling.approach import center_of_pads
+from logs.report.coverage import Histogram, PlanCoverage
 from reach.arrays import BoolArray, FloatArray, IntArray
 from reach.gripper import ParallelJawGripper
 from reach.objects import GraspObject
@@ -35,53 +35,11 @@ class Contact(StrEnum):
     MISS = "miss"
 
 
-class Histogram(BaseModel):
-    """Counts of values between edges; one more edge than counts, SI units."""
-
-    model_config = ConfigDict(extra="forbid", frozen=True)
-
-    edges: tuple[float, ...]
-    counts: tuple[int, ...]
-
-    @classmethod
-    def of(cls, values: FloatArray, high: float) -> Histogram:
-        """Histogram of values (N,) from zero to at least `high`."""
-        top = max(high, float(values.max(initial=0.0)))
-        counts, edges = np.histogram(values, bins=_BINS, range=(0.0, top))
-        return cls(edges=tuple(edges.tolist()), counts=tuple(counts.tolist()))
-
-
-class Coverage(BaseModel):
-    """What a set of grasps covers.
-
-    Attributes:
-        grasps: how many.
-        approach_angle: between approach and straight down [rad].
-        width: of the part between the parents' contacts [m].
-        offset: of the pads' center from the parents' [m].
-        contacts: pads (two a grasp) by what their middle meets: face, edge, corner or miss.
-    """
-
-    model_config = ConfigDict(extra="forbid", frozen=True)
-
-    grasps: int
-    approach_angle: Histogram
-    width: Histogram
-    offset: Histogram
-    contacts: dict[Contact, int]
-
-    @property
-    def shares(self) -> dict[Contact, float]:
-        """Share of the pads on faces, edges, corners and nothing."""
-        total = max(1, sum(self.contacts.values()))
-        return {kind: number / total for kind, number in self.contacts.items()}
-
-
 def coverage(
     grasps: Iterable[PlannedGrasp],
     objects: Mapping[str, GraspObject],
     gripper: ParallelJawGripper,
-) -> Coverage:
+) -> PlanCoverage:
     """Count what grasps cover.
 
     Args:
@@ -100,13 +58,20 @@ def coverage(
         np.linalg.norm((g.T_object_gripper @ center - g.T_object_gripper_parent @ center)[:3, 3])
         for g in grasps
     ]
-    return Coverage(
+    return PlanCoverage(
         grasps=len(grasps),
-        approach_angle=Histogram.of(np.array([g.approach_angle for g in grasps]), np.pi / 3),
-        width=Histogram.of(np.array([g.width for g in grasps]), gripper.max_opening),
-        offset=Histogram.of(np.array(offsets), gripper.jaws[0].pad.width),
-        contacts=counts,
+        approach_angle=_histogram(np.array([g.approach_angle for g in grasps]), np.pi / 3),
+        width=_histogram(np.array([g.width for g in grasps]), gripper.max_opening),
+        offset=_histogram(np.array(offsets), gripper.jaws[0].pad.width),
+        contacts={kind.value: count for kind, count in counts.items()},
     )
+
+
+def _histogram(values: FloatArray, high: float) -> Histogram:
+    """Histogram of values (N,) from zero to at least `high`."""
+    top = max(high, float(values.max(initial=0.0)))
+    counts, edges = np.histogram(values, bins=_BINS, range=(0.0, top))
+    return Histogram(tuple(edges.tolist()), tuple(counts.tolist()))
 
 
 def _met_by_pads(

@@ -18,16 +18,14 @@ from logs.record.annotations import PatchRecord
 from logs.record.descriptions import GRIPPER_DESCRIPTION, STATION_FILE, read_gripper
 from logs.record.mesh_attachment import OBJECT_MESH, read_mesh
 from logs.record.trial_record import TrialRecord, read_record
-from reach.arrays import FloatArray
 from reach.evaluation.scored import used_parameters
 from reach.grasp import Grasp
+from reach.models.names import PATCH_MODEL
 from reach.models.registry import Score, make_scorer, warm_up
 from reach.objects import GraspObject
 from reach.pose_error import PoseError
 from reach.scene import Scene
 
-PATCH_MODEL = "reach"
-"""The model whose contact patches are kept for the view."""
 LARGEST_PATCH = 4000
 """Triangles; a larger patch is not kept with the score."""
 
@@ -100,19 +98,10 @@ def table_height(record: TrialRecord) -> float:
 
 
 def registration_error(record: TrialRecord) -> PoseError:
-    """A take's own registration covariance; directions the image cannot tell count as known.
-
-    The image leaves a direction untold where the part is symmetric about it, and then no contact
-    model can tell either.
-    """
+    """A take's own registration covariance, but for turns about an axis of symmetry."""
     if record.registration is None:
         return PoseError(np.zeros((6, 6)))
-    return PoseError(_bounded(record.registration.covariance))
-
-
-def _bounded(covariance: FloatArray) -> FloatArray:
-    known = np.isfinite(np.diag(covariance))
-    return np.where(known[:, None] & known[None, :], covariance, 0.0)
+    return PoseError(record.registration.covariance).without_free_turns()
 
 
 def _predict(name: str, scene: Scene, grasp: Grasp, pose_error: PoseError, seed: int) -> Prediction:

@@ -9,6 +9,7 @@ import numpy as np
 
 from logs.dataset.dataset import Dataset, StatedPoseError
 from logs.dataset.labeled_trial import Execution, Label, LabeledTrial, LeftOut, StoredScore
+from logs.dataset.registration_residual import claimed_variances
 from logs.errors import DatasetError
 from logs.journal.events import LabelEvent, Outcome, Scored
 from logs.journal.state import TakeState, TrialState
@@ -269,15 +270,12 @@ def _pose_error(
         trials: those that count.
         station: variances of calibration and actuation together, and whence; None if not stated.
     """
-    covariances = [t.execution.covariance for t in trials if t.execution.covariance is not None]
-    if not covariances:
+    claimed = claimed_variances(trials)
+    if claimed is None:
         return None
-    diagonals = np.array([np.diag(covariance) for covariance in covariances])
-    # A direction that the image cannot tell is one the part is symmetric about: no grasp can
-    # tell it either.
-    variances = np.where(np.isfinite(diagonals), diagonals, 0.0).mean(axis=0)
+    variances, count = claimed
     translation, rotation = variances[3:].mean(), variances[:3].mean()
-    basis = f"root mean square of {len(covariances)} registrations' stated covariances"
+    basis = f"root mean square of {count} registrations' stated covariances"
     if station is not None:
         translation, rotation = translation + station[0], rotation + station[1]
         basis += f", and {station[2]}"

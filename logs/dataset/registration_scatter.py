@@ -1,9 +1,8 @@
 """What a station's own registrations say of its pose error.
 
-A part at rest on the table has its planned tilt and height, whatever the operator's hand did: the
-scatter of the registered tilt and height is an error that was really made. The other three
-directions (in the table's plane, and turning on it) are placed anew every time, and only what
-registration claims of itself is known there.
+The scatter of tilt and height of parts at rest is an error that was really made (see
+[logs.dataset.registration_residual][]). In the other three directions, in the table's plane and
+turning on it, only what registration claims of itself is known.
 """
 
 from __future__ import annotations
@@ -15,6 +14,7 @@ from typing import Any
 import numpy as np
 
 from logs.dataset.labeled_trial import LabeledTrial
+from logs.dataset.registration_residual import claimed_variances, resting_residual
 from reach.arrays import FloatArray
 
 FEWEST = 5
@@ -71,20 +71,17 @@ class RegistrationScatter:
 
 def registration_scatter(trials: Sequence[LabeledTrial]) -> RegistrationScatter:
     """Measure it over the trials that were registered on their planned side."""
-    tilts: list[float] = []
-    heights: list[float] = []
-    for trial in trials:
-        residual = _residual(trial)
-        if residual is not None:
-            tilts += residual[:2].tolist()
-            heights.append(float(residual[2]))
-    covariances = [t.execution.covariance for t in trials if t.execution.covariance is not None]
-    claimed = _claimed(covariances)
+    residuals = [one for one in map(resting_residual, trials) if one is not None]
+    tilts = [angle for one in residuals for angle in (one.tilt_x, one.tilt_y)]
+    heights = [one.height for one in residuals]
+    claimed = claimed_variances(trials)
+    rotation, translation = (None, None) if claimed is None else _deviations(claimed[0])
     axes = np.sqrt(3.0)  # errors are lengths of vectors; a spread is of one coordinate
     return RegistrationScatter(
         _spread(tilts),
         _spread(heights),
-        *claimed,
+        rotation,
+        translation,
         _spread([t.execution.rotation_error / axes for t in trials if t.execution.rotation_error]),
         _spread(
             [t.execution.translation_error / axes for t in trials if t.execution.translation_error]
@@ -92,23 +89,8 @@ def registration_scatter(trials: Sequence[LabeledTrial]) -> RegistrationScatter:
     )
 
 
-def _residual(trial: LabeledTrial) -> FloatArray | None:
-    """Tilt about the world's x and y [rad], and height [m], of the registered against the plan."""
-    registered, planned = trial.execution.T_world_object, trial.T_world_object
-    if registered is None or registered[2, :3] @ planned[2, :3] < 0.9:
-        return None
-    # The vertical in the object's frame, as planned and as registered: what turns one into the
-    # other is the tilt, free of how the part was turned on the table.
-    turn = np.cross(planned[2, :3], registered[2, :3])
-    tilt = planned[:3, :3] @ turn
-    return np.array([tilt[0], tilt[1], registered[2, 3] - planned[2, 3]])
-
-
-def _claimed(covariances: Sequence[FloatArray]) -> tuple[float | None, float | None]:
-    if not covariances:
-        return None, None
-    diagonals = np.array([np.diag(covariance) for covariance in covariances])
-    variances = np.where(np.isfinite(diagonals), diagonals, 0.0).mean(axis=0)
+def _deviations(variances: FloatArray) -> tuple[float, float]:
+    """Root mean square of one angle [rad] and of one coordinate [m]."""
     return float(np.sqrt(variances[:3].mean())), float(np.sqrt(variances[3:].mean()))
 
 

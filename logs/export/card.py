@@ -10,7 +10,7 @@ from typing import Any
 from logs.dataset.dataset import Dataset
 from logs.dataset.manifest import FRAMES, UNITS
 from logs.export.columns import columns, scored_models
-from logs.report.footnotes import ORACLE, footnotes
+from logs.footnotes import ORACLE, footnotes
 
 CARD_NAME = "README.md"
 _CONTENTS: Mapping[str, str] = {

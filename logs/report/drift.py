@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from logs.dataset.registration_residual import resting_residual
 from logs.report.charts import FAILURE_COLOR, MODEL_COLORS, SUCCESS_COLOR, figure, to_svg
 from reach.arrays import FloatArray
 
@@ -142,14 +143,8 @@ def _segment(
 
 def _residual(trial: LabeledTrial) -> tuple[float, float]:
     """Tilt [rad] and height [m] of the registered pose against the planned one."""
-    registered = trial.execution.T_world_object
-    if registered is None:
-        return np.nan, np.nan
-    cosine = float(registered[2, :3] @ trial.T_world_object[2, :3])
-    if cosine < 0.5:  # the part was put down on another side
-        return np.nan, np.nan
-    tilt = float(np.arccos(np.clip(cosine, -1, 1)))
-    return tilt, float(registered[2, 3] - trial.T_world_object[2, 3])
+    found = resting_residual(trial)
+    return (np.nan, np.nan) if found is None else (found.tilt, found.height)
 
 
 def _trend(values: FloatArray) -> tuple[float, float] | None:

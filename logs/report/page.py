@@ -7,14 +7,16 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from logs.footnotes import ORACLE, footnotes, shared_with_engine
 from logs.report import sections
 from logs.report.coverage import PlanCoverage, coverage_svg
 from logs.report.curves import precision_recall_svg, reliability_svg
 from logs.report.drift import drift_svg, measure_drift
-from logs.report.footnotes import ORACLE, footnotes, shared_with_engine
+from logs.report.numbers import span
 from logs.report.pressure import compare_pressure, pressure_svg
 from logs.report.reliability_map import ReliabilityPaint, probe_grasps, reliabilities
 from logs.report.rendering import data_uri, object_solid, render
+from reach.evaluation.bootstrap import interval_note
 from reach.evaluation.table import Evaluation
 
 if TYPE_CHECKING:
@@ -54,6 +56,7 @@ def build_report(
     from jinja2 import Environment, StrictUndefined
 
     environment = Environment(undefined=StrictUndefined, autoescape=True, trim_blocks=True)
+    environment.filters["span"] = span
     text = resources.files("logs.report").joinpath("report.html").read_text(encoding="utf-8")
     drift = measure_drift(dataset)
     names = [row.name for row in result.rows]
@@ -77,6 +80,7 @@ def build_report(
         coverage_picture=coverage_svg(covered) if covered else None,
         agreement=agreement,
         gains=result.gains,
+        interval_note=interval_note(result.outcomes),
         notes=footnotes(names, simulated=dataset.simulated),
         shared=shared_with_engine(names, simulated=dataset.simulated),
         oracle=ORACLE,

@@ -14,6 +14,7 @@ from logs.report.views import grasp_picture, object_picture
 from reach.arrays import FloatArray
 from reach.evaluation.references import REFERENCE_NAMES
 from reach.evaluation.table import Evaluation, ModelRow
+from reach.models.names import JUDGES
 
 if TYPE_CHECKING:
     from logs.dataset.dataset import Dataset
@@ -23,7 +24,6 @@ WORST = 4
 """Cards of false positives, and of false negatives."""
 AT_LEAST_OFF = 0.3
 """A score that is off by less is no disagreement worth a picture."""
-PREFERRED = ("settled-robust", "reach-robust", "settled", "reach")
 
 
 def gallery(dataset: Dataset) -> list[dict[str, Any]]:
@@ -107,7 +107,7 @@ def _worst(result: Evaluation, off: FloatArray) -> list[int]:
 def preferred(result: Evaluation) -> ModelRow:
     """The row whose mistakes are shown: the best of ours that was evaluated."""
     by_name = {row.name: row for row in result.rows}
-    return next((by_name[name] for name in PREFERRED if name in by_name), result.rows[0])
+    return next((by_name[name] for name in JUDGES if name in by_name), result.rows[0])
 
 
 def station(dataset: Dataset) -> dict[str, Any]:

@@ -7,7 +7,8 @@ from importlib import resources
 from statistics import median
 from typing import Any
 
-from logs.report.footnotes import ORACLE, footnotes, shared_with_engine
+from logs.footnotes import ORACLE, footnotes, shared_with_engine
+from logs.report.numbers import number, signed, span
 from logs.report.paper import PAPER_TABLE
 
 METRICS = ("ap", "ar", "f1", "mae", "brier")
@@ -31,9 +32,9 @@ def table_page(content: Mapping[str, Any], command: str) -> str:
         undefined=StrictUndefined, keep_trailing_newline=True, autoescape=False, trim_blocks=True
     )
     environment.filters |= {
-        "number": _number,
-        "span": _span,
-        "signed": _signed,
+        "number": number,
+        "span": _bracketed,
+        "signed": signed,
         "percent": _percent,
     }
     notes = footnotes(content["models"], simulated=content["simulated"])
@@ -103,20 +104,10 @@ def _lifted(content: Mapping[str, Any]) -> float:
     return share
 
 
-def _number(value: float | None, digits: int = 3) -> str:
-    return "–" if value is None else f"{value:.{digits}f}"
-
-
-def _signed(value: float | None) -> str:
-    return "–" if value is None else f"{value:+.3f}"
-
-
-def _span(bounds: Sequence[float] | None, *, signed: bool = False) -> str:
-    """An interval in parentheses, or nothing."""
-    if bounds is None:
-        return ""
-    low, high = (f"{value:+.2f}" if signed else f"{value:.2f}" for value in bounds)
-    return f"({low} to {high})"
+def _bracketed(bounds: Sequence[float] | None, *, with_sign: bool = False) -> str:
+    """A space and an interval in parentheses, or nothing."""
+    text = span(bounds, with_sign=with_sign)
+    return f" ({text})" if text else ""
 
 
 def _percent(value: float) -> str:

@@ -11,6 +11,7 @@ from logs.record.annotations import PatchRecord, ScoreRecord
 from logs.view import colors
 from logs.view.object import OBJECT
 from logs.view.stage import Stage, flat_mesh
+from reach.models.names import PATCH_MODEL
 
 CONTACTS = f"{OBJECT}/contacts"
 SHOWN_CONTACTS = f"{CONTACTS}/shown"
@@ -23,7 +24,6 @@ ARROW_RADIUS = 0.012
 """Of a force arrow, in diameters of the object."""
 BRIGHT_SHARE = 95
 """Percentile of the pressures from which on all is yellow."""
-PREFERRED = "reach"
 
 
 def show_contacts(stage: Stage, scores: dict[str, ScoreRecord], diameter: float) -> None:
@@ -45,7 +45,7 @@ def show_contacts(stage: Stage, scores: dict[str, ScoreRecord], diameter: float)
 def model_with_contacts(scores: dict[str, ScoreRecord]) -> str | None:
     """The model whose contacts the view shows first."""
     models = [model for model, score in scores.items() if score.patches]
-    return PREFERRED if PREFERRED in models else next(iter(models), None)
+    return PATCH_MODEL if PATCH_MODEL in models else next(iter(models), None)
 
 
 def highest_pressure(score: ScoreRecord) -> float:

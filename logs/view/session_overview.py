@@ -7,12 +7,11 @@ from dataclasses import dataclass
 
 from logs.errors import ViewError
 from logs.session.index_table import IndexRow
+from reach.models.names import JUDGES
 
 TIMELINES = ("disagreement", "trial", "by_object", "by_outcome")
 """Orders to browse in; each counts from 1."""
 PREDICTS_SUCCESS = 0.5
-JUDGES = ("settled-robust", "reach-robust", "settled", "reach")
-"""Whose disagreements come first: the first of these that scored anything, as in the report."""
 
 
 @dataclass(frozen=True, slots=True)

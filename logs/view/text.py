@@ -8,7 +8,9 @@ import numpy as np
 
 from logs.record.annotations import Annotations, LabelRecord, ScoreRecord
 from logs.record.trial_record import TrialRecord
-from logs.view.contacts import PREFERRED, brightest_pressure, highest_pressure
+from logs.view.contacts import brightest_pressure, highest_pressure
+from reach.models.names import PATCH_MODEL
+from reach.pose_error import PoseError
 
 DISAGREES = 0.5
 """A model predicts success from this score on."""
@@ -75,7 +77,7 @@ def _scores(annotations: Annotations) -> str:
 def _ordered(annotations: Annotations) -> list[ScoreRecord]:
     """Newest scores, that of the model whose contacts are shown first."""
     scores = annotations.newest_scores.values()
-    return sorted(scores, key=lambda score: (score.model != PREFERRED, score.model))
+    return sorted(scores, key=lambda score: (score.model != PATCH_MODEL, score.model))
 
 
 def _said(score: ScoreRecord) -> list[str]:
@@ -139,7 +141,7 @@ def _registration(record: TrialRecord) -> str:
     found = record.registration
     if found is None:
         return "**Pose:** not found"
-    spread = np.sqrt(np.diag(found.covariance))
+    spread = np.sqrt(np.diag(PoseError(found.covariance).without_free_turns().covariance))
     lines = [
         "**Pose**",
         "",

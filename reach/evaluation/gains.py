@@ -11,7 +11,8 @@ from dataclasses import dataclass
 from typing import Any
 
 from reach.arrays import FloatArray
-from reach.evaluation.bootstrap import Interval, interval
+from reach.evaluation.bootstrap import Interval, difference_intervals
+from reach.evaluation.cases import Outcomes
 
 PAIRS = (("reach", "point"), ("reach-robust", "point-robust"))
 RECALL_GAIN = 0.11
@@ -59,6 +60,7 @@ class Gain:
 
 
 def gains(
+    outcomes: Outcomes,
     means: Mapping[str, Mapping[str, float | None]],
     resampled: Mapping[str, Mapping[str, FloatArray]],
     pairs: Iterable[tuple[str, str]] = PAIRS,
@@ -66,21 +68,33 @@ def gains(
     """Gains of those pairs of which both models were evaluated.
 
     Args:
+        outcomes: of the data set.
         means: model -> metric -> average over objects.
         resampled: model -> metric -> the same in each of B resamplings, shape (B,).
         pairs: (model, rival).
     """
     return tuple(
-        Gain(
-            model,
-            rival,
-            _difference(means[model]["ap"], means[rival]["ap"]),
-            _difference(means[model]["ar"], means[rival]["ar"]),
-            interval(resampled[model]["ap"] - resampled[rival]["ap"]),
-            interval(resampled[model]["ar"] - resampled[rival]["ar"]),
-        )
+        _gain(outcomes, means, resampled, model, rival)
         for model, rival in pairs
         if model in means and rival in means
+    )
+
+
+def _gain(
+    outcomes: Outcomes,
+    means: Mapping[str, Mapping[str, float | None]],
+    resampled: Mapping[str, Mapping[str, FloatArray]],
+    model: str,
+    rival: str,
+) -> Gain:
+    bounds = difference_intervals(outcomes, resampled[model], resampled[rival])
+    return Gain(
+        model,
+        rival,
+        _difference(means[model]["ap"], means[rival]["ap"]),
+        _difference(means[model]["ar"], means[rival]["ar"]),
+        bounds["ap"],
+        bounds["ar"],
     )
 
 

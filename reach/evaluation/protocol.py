@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from reach.evaluation.bootstrap import Interval, bootstrap, interval, told
+from reach.evaluation.bootstrap import Interval, bootstrap, intervals
 from reach.evaluation.cross_validation import (
     DRAWS,
     CrossValidation,
@@ -21,7 +21,7 @@ from reach.evaluation.cross_validation import (
     variants,
 )
 from reach.evaluation.gains import PAIRS, Gain, gains
-from reach.evaluation.table import METRIC_NAMES, Evaluation
+from reach.evaluation.table import Evaluation
 
 if TYPE_CHECKING:
     from reach.pose_error import PoseError
@@ -112,7 +112,6 @@ def run_protocol(
     labels = [label_of(row.model, row.saturated) for row in rows]
     scores = {label: row.scores for label, row in zip(labels, rows, strict=True)}
     resampled = bootstrap(result.outcomes, scores, np.random.default_rng(seed))
-    known = told(result.outcomes)
     means = {label: row.mean for label, row in zip(labels, rows, strict=True)}
     pairs = [
         (label_of(model, saturated), label_of(rival, None))
@@ -123,10 +122,7 @@ def run_protocol(
         draws,
         seed,
         rows,
-        tuple(
-            {key: interval(resampled[label][key]) if key in known else None for key in METRIC_NAMES}
-            for label in labels
-        ),
-        gains(means, resampled, pairs),
+        tuple(intervals(result.outcomes, resampled[label]) for label in labels),
+        gains(result.outcomes, means, resampled, pairs),
         tuple(name for name in names if name not in drawn),
     )

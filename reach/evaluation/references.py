@@ -9,7 +9,7 @@ of equal rate, which it does not tell apart, and for unequal numbers of trials.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -25,6 +25,8 @@ if TYPE_CHECKING:
     from reach.pose_error import PoseError
 
 REFERENCE_NAMES = ("constant", "overlap", "oracle")
+EXACT: Mapping[str, tuple[str, ...]] = {"constant": ("ar",), "oracle": ("mae",)}
+"""Metrics whose value follows from a row's definition, whatever the labels."""
 
 
 @dataclass(frozen=True, slots=True)

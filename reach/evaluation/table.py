@@ -11,13 +11,20 @@ import numpy as np
 from reach.arrays import FloatArray
 from reach.errors import UnknownNameError
 from reach.evaluation import metrics
-from reach.evaluation.bootstrap import DRAWS, OBJECT_METRICS, Interval, bootstrap, interval, told
+from reach.evaluation.bootstrap import (
+    DRAWS,
+    METRIC_NAMES,
+    OBJECT_METRICS,
+    Interval,
+    bootstrap,
+    difference_intervals,
+    interval_note,
+    intervals,
+)
 from reach.evaluation.cases import GraspCase, Outcomes, check_scores
 from reach.evaluation.gains import Gain, gains
-from reach.evaluation.references import REFERENCE_NAMES
+from reach.evaluation.references import EXACT, REFERENCE_NAMES
 from reach.evaluation.scored import Parameter, ScoredModel
-
-METRIC_NAMES = ("ap", "ar", "f1", "mae", "brier")
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -94,6 +101,7 @@ class Evaluation:
                 }
                 for one in self.outcomes.objects
             },
+            "interval_note": interval_note(self.outcomes),
             "objects_without_positive": list(self.outcomes.without_positive),
             "grasps": len(self.cases),
             "trials": trials,
@@ -134,7 +142,7 @@ def tabulate(
     resampled = bootstrap(outcomes, scores, np.random.default_rng(seed), draws)
     rows = tuple(_row(one, outcomes, resampled) for one in scored)
     means = {row.name: row.mean for row in rows}
-    return Evaluation(rows, tuple(cases), outcomes, gains(means, resampled), seed)
+    return Evaluation(rows, tuple(cases), outcomes, gains(outcomes, means, resampled), seed)
 
 
 def object_metrics(outcomes: Outcomes, scores: FloatArray) -> dict[str, dict[str, float | None]]:
@@ -170,14 +178,13 @@ def _row(
 ) -> ModelRow:
     drawn = resampled[one.name]
     overlap = resampled.get("overlap")
-    known = told(outcomes)
     above: dict[str, Interval] = {}
     if overlap is not None and one.name not in REFERENCE_NAMES:
-        above = {key: interval(drawn[key] - overlap[key]) for key in known}
+        above = difference_intervals(outcomes, drawn, overlap)
     return ModelRow(
         one.name,
         mean_metrics(outcomes, one.values),
-        {key: interval(drawn[key]) if key in known else None for key in METRIC_NAMES},
+        intervals(outcomes, drawn, EXACT.get(one.name, ())),
         above,
         mean_metrics(outcomes.majority(), one.values),
         object_metrics(outcomes, one.values),

@@ -13,3 +13,9 @@ ANALYTIC_NAMES = (
 """Models cheap enough to score every trial with."""
 
 MODEL_NAMES = (*ANALYTIC_NAMES, "dynamic")
+
+JUDGES = ("settled-robust", "reach-robust", "settled", "reach")
+"""Whose disagreements with the labels are shown: the first of these that scored anything."""
+
+PATCH_MODEL = "reach"
+"""The model whose contact patches are kept and shown."""

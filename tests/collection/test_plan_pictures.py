@@ -38,7 +38,7 @@ def test_coverage_counts_every_grasp_and_both_pads(plan, parts):
         assert len(histogram.edges) == len(histogram.counts) + 1
     assert sum(found.contacts.values()) == 48
     assert sum(found.shares.values()) == pytest.approx(1)
-    assert type(found).model_validate_json(found.model_dump_json()) == found
+    assert set(found.shares) == {kind.value for kind in Contact}
 
 
 def test_without_jitter_no_pad_misses_and_offsets_are_zero(parts):

@@ -8,7 +8,13 @@ from sklearn.metrics import average_precision_score, brier_score_loss, recall_sc
 
 from reach.arrays import frozen
 from reach.evaluation import metrics
-from reach.evaluation.bootstrap import bootstrap, interval, told
+from reach.evaluation.bootstrap import (
+    bootstrap,
+    difference_intervals,
+    interval,
+    interval_note,
+    intervals,
+)
 from reach.evaluation.cases import ObjectOutcomes, Outcomes
 from reach.evaluation.gains import gains
 from reach.evaluation.table import mean_metrics
@@ -151,7 +157,7 @@ def test_bootstrap_is_seeded_and_brackets_the_estimate():
     first = bootstrap(both, scores, np.random.default_rng(1), draws=500)
     again = bootstrap(both, scores, np.random.default_rng(1), draws=500)
     np.testing.assert_array_equal(first["noisy"]["ap"], again["noisy"]["ap"])
-    low, high = interval(first["noisy"]["mae"])
+    low, high = interval(first["noisy"]["mae"], 8)
     assert low < np.mean(np.abs(scores["noisy"] - rates)) < high
     # Models share their draws: the oracle is never worse in any of them.
     assert np.all(first["oracle"]["mae"] <= first["noisy"]["mae"])
@@ -169,34 +175,111 @@ def test_bootstrap_spread_matches_the_two_stage_variance():
     # An object without a positive is left out of AP: the draws of b alone define none.
     assert np.isnan(drawn["one"]["ap"]).mean() == pytest.approx(0.25, abs=0.03)
     assert set(drawn["one"]["ap"][np.isfinite(drawn["one"]["ap"])]) == {1.0}
-    assert interval(np.array([np.nan])) is None
+    assert interval(np.full(9, np.nan), 9) is None
 
 
-def test_no_interval_where_the_labels_cannot_tell_one():
-    """Two grasps that always work have an AP of 1 in every draw, and it means nothing."""
+def many(successes, trials, count):
+    """The same grasps on several objects."""
+    objects = tuple(outcomes(successes, trials, str(i)) for i in range(count))
+    size = len(trials)
+    return Outcomes(objects, tuple(np.arange(i * size, (i + 1) * size) for i in range(count)))
 
-    def only(successes, trials):
-        return Outcomes((outcomes(successes, trials),), (np.arange(len(trials)),))
 
-    assert told(only([1, 1], [1, 1])) == ()
-    assert told(only([5, 0, 3, 1], [5] * 4)) == ()
-    assert told(only([5] * 5, [5] * 5)) == ("ar", "mae", "brier")
-    assert set(told(only([5, 5, 5, 5, 4], [5] * 5))) == {"ap", "ar", "f1", "mae", "brier"}
+def bounds(some, scores, exact=()):
+    drawn = bootstrap(some, {"one": scores}, np.random.default_rng(0), 400)
+    return intervals(some, drawn["one"], exact)
+
+
+def test_too_few_objects_have_no_interval():
+    """However many grasps there are: how objects scatter is not known from four."""
+    four, five = (many([5, 0, 3, 1] * 5, [5] * 20, count) for count in (4, 5))
+    assert set(bounds(four, np.tile(four.objects[0].rates, 4)).values()) == {None}
+    assert "too few objects (4 with a success, it takes 5)" in interval_note(four)
+    assert None not in bounds(five, np.linspace(0, 1, 100)).values()
+    assert "(5)" in interval_note(five)
+
+
+def test_only_objects_that_define_a_metric_count():
+    """Six objects, two of them never lifted: AP and AR are means over four."""
+    lost = tuple(outcomes([0, 0], [5, 5], f"lost {i}") for i in range(2))
+    rest = many([5, 2], [5, 5], 4)
+    everything = Outcomes(rest.objects + lost, tuple(np.arange(2 * i, 2 * i + 2) for i in range(6)))
+    found = bounds(everything, np.tile([0.9, 0.3], 6))
+    assert found["ap"] is found["ar"] is found["f1"] is None
+    assert found["mae"] and found["brier"]
+
+
+def test_a_perfect_row_is_not_certain():
+    """Twelve objects ranked without a mistake: in up to 26 % of all objects there may be one."""
+    perfect = many([5, 5, 0], [5, 5, 5], 12)
+    found = bounds(perfect, np.tile([1.0, 0.8, 0.1], 12))
+    low, high = found["ap"]
+    assert high == 1.0
+    assert low**12 == pytest.approx(0.025)  # Clopper and Pearson's bound, by its definition
+    scores = np.tile([1.0, 1.0, 0.0], 12)
+    assert bounds(perfect, scores)["mae"] == pytest.approx((0.0, 1.0 - low))
+    assert bounds(perfect, scores, exact=("mae",))["mae"] is None  # the oracle's, by definition
+
+
+def test_where_nothing_failed_average_precision_tells_nothing():
+    lifted = many([5] * 5, [5] * 5, 6)
+    found = bounds(lifted, np.linspace(0, 1, 30))
+    assert found["ap"] is None and found["ar"] is not None
+    assert "No trial failed" in interval_note(lifted)
+
+
+def test_interval_of_few_objects_is_wider_than_their_percentiles():
+    """Student's factor: of a normal sample of n values, percentiles reach t sqrt(n / (n - 1))."""
+    drawn = np.random.default_rng(0).normal(0.5, 0.05, 400_000)
+    low, high = interval(drawn, 6)
+    expected = 0.05 * 2.5706 * np.sqrt(6 / 5)  # quantile .975 of t with 5 degrees of freedom
+    assert (high - low) / 2 == pytest.approx(expected, rel=0.02)
+    wide, narrow = interval(drawn, 5), interval(drawn, 500)
+    assert wide[0] < low < narrow[0] < narrow[1] < high < wide[1]
+
+
+@pytest.mark.parametrize("count", [5, 8])
+def test_intervals_cover_the_truth(count):
+    """In made-up experiments whose truth is known, at least as often as they say, nearly."""
+
+    def experiment(rng, objects, grasps=12, repeats=3):
+        level = rng.beta(4, 2, objects)[:, None]
+        chance = rng.beta(3 * level, 3 * (1 - level), (objects, grasps))
+        scores = np.clip(chance + rng.normal(0, 0.2, chance.shape), 0, 1)
+        lifted = rng.binomial(repeats, chance)
+        made = [outcomes(row, np.full(grasps, repeats), str(i)) for i, row in enumerate(lifted)]
+        places = np.arange(objects * grasps).reshape(objects, grasps)
+        return Outcomes(tuple(made), tuple(places)), scores.ravel()
+
+    rng = np.random.default_rng(count)
+    truth = mean_metrics(*experiment(rng, 3000))
+    hits = {"ap": 0, "ar": 0, "mae": 0}
+    for _ in range(60):
+        made, scores = experiment(rng, count)
+        drawn = bootstrap(made, {"one": scores}, rng, 300)
+        found = intervals(made, drawn["one"])
+        for key in hits:
+            low, high = found[key]
+            hits[key] += low <= truth[key] <= high
+    assert all(hit >= 53 for hit in hits.values()), hits  # 95 % of 60 is 57; 53 or less: 3 in 100
 
 
 def test_gain_is_paired_and_judged_as_the_paper_states_it():
     """A model that is the rival shifted on every grasp alike gains with no scatter at all."""
-    objects = tuple(outcomes([5, 3, 0], [5, 5, 5], name) for name in "ab")
-    everything = Outcomes(objects, (np.arange(3), np.arange(3, 6)))
-    low = np.array([0.55, 0.35, 0.05] * 2)
+    everything = many([5, 3, 0], [5, 5, 5], 6)
+    low = np.array([0.55, 0.35, 0.05] * 6)
     scores = {"reach": low + 0.2, "point": low}
     resampled = bootstrap(everything, scores, np.random.default_rng(0), 300)
     means = {name: mean_metrics(everything, values) for name, values in scores.items()}
-    (gain,) = gains(means, resampled)
+    (gain,) = gains(everything, means, resampled)
     # Two thresholds more pass for every grasp: recall gains 2/11, the ranking is the same.
     assert gain.ar == pytest.approx(2 / 11) and gain.ap == pytest.approx(0)
-    assert gain.ar_interval == pytest.approx((2 / 11, 2 / 11))
+    assert gain.ar_interval is None  # alike on all six objects: nothing is told of others
     assert gain.as_published is True
-    (back,) = gains(means, resampled, [("point", "reach")])
+    (back,) = gains(everything, means, resampled, [("point", "reach")])
     assert back.as_published is False and back.ar == pytest.approx(-2 / 11)
-    assert gains({"reach": means["reach"]}, resampled) == ()
+    assert gains(everything, {"reach": means["reach"]}, resampled) == ()
+    scores["point"] = low * np.repeat(np.linspace(0.5, 1.0, 6), 3)
+    drawn = bootstrap(everything, scores, np.random.default_rng(0), 300)
+    lower, upper = difference_intervals(everything, drawn["reach"], drawn["point"])["ar"]
+    assert 0 < lower < np.mean(drawn["reach"]["ar"] - drawn["point"]["ar"]) < upper

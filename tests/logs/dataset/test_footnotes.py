@@ -4,7 +4,7 @@ from dataclasses import replace
 
 from logs.dataset.labeled_trial import StoredScore
 from logs.export.card import card_bytes
-from logs.report.footnotes import footnotes, shared_with_engine
+from logs.footnotes import footnotes, shared_with_engine
 
 
 def test_settled_is_marked_on_simulated_labels_only():

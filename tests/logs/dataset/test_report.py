@@ -50,7 +50,7 @@ def result(dataset):
 def page(dataset, result):
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr("logs.report.page.PROBES", 60)
-        agreement = OperatorAgreement(pairs=10, agreed=9, kappa=0.787)
+        agreement = OperatorAgreement(pairs=10, agreed=9, kappa=0.787, interval=(0.41, 0.96))
         return build_report(dataset, result, ERROR, basis="made up", agreement=agreement)
 
 
@@ -310,5 +310,5 @@ def test_a_step_between_segments_is_no_trend_within_them(dataset):
 
 def test_page_shows_agreement_of_operators_and_gain_over_the_point_model(page):
     text = parsed(page).text
-    assert "agrees on 9 of 10 blind verdicts" in text and "0.79" in text
+    assert "agrees on 9 of 10 blind verdicts" in text and "0.79 (95 %: +0.41" in text
     assert "reach against point: AR" in text

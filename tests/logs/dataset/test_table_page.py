@@ -5,6 +5,7 @@ import json
 import pytest
 
 from collection.analysis.evaluating import evaluation_content
+from logs.report.numbers import span
 from logs.report.table_page import table_page
 from reach.evaluation.compare import compare, scorers_of
 from reach.evaluation.protocol import run_protocol
@@ -21,7 +22,7 @@ def content(make_dataset, tmp_path_factory):
     cache = tmp_path_factory.mktemp("cache")
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr("reach.evaluation.score_cache.cache_folder", lambda: cache)
-        dataset = make_dataset(objects=3, grasps=5, repeats=3)
+        dataset = make_dataset(objects=5, grasps=4, repeats=3)
         result = compare(dataset.cases(), scorers_of(NAMES), pose_error=ERROR)
         protocol = run_protocol(result, make_scorer, NAMES, pose_error=ERROR, draws=4)
         found = evaluation_content(dataset, result, BASIS, protocol)
@@ -51,11 +52,11 @@ def test_every_table_is_well_formed_and_holds_the_numbers(content):
     for name in ("point", "reach"):
         row = content["models"][name]
         low, high = row["intervals"]["ap"]
-        assert lines[name][1] == f"{row['ap']:.3f} ({low:.2f} to {high:.2f})"
+        assert lines[name][1] == f"{row['ap']:.3f} ({span([low, high])})"
         assert lines[name][3:6] == [f"{row[key]:.3f}" for key in ("f1", "mae", "brier")]
     assert lines["reach"][-3:] == ["0.77", "0.72", "0.053"]
     assert lines["*oracle*"][-3:] == ["", "", ""]
-    assert [row[0] for row in objects[2:]] == ["part 0", "part 1", "part 2"]
+    assert [row[0] for row in objects[2:]] == [f"part {i}" for i in range(5)]
     assert [row[0] for row in parameters[2:]] == ["point", "reach", "settled [1]"]
     # The paper's figures stand beside the treatment of the depth that the paper used.
     by_depth = {(row[0], row[1]): row for row in held_out[2:]}
@@ -98,7 +99,7 @@ def test_the_page_names_the_data_and_the_command(content):
     page = table_page(content, "reach evaluate S --models all")
     assert "```sh\nreach evaluate S --models all\n```" in page
     assert "Left out: 1 executed, not labeled." in page
-    assert "45 trials of 15 planned grasps on 3 objects" in page
+    assert "60 trials of 20 planned grasps on 5 objects" in page
     without = {key: value for key, value in content.items() if key != "cross_validation"}
     assert "Leave one object out" not in table_page(without, "x")
 
@@ -109,3 +110,23 @@ def test_the_oracle_is_called_a_ceiling_only_of_what_it_bounds(content):
     for key in ("mae", "brier"):
         assert all(row[key] >= models["oracle"][key] for row in models.values())
     assert "bounds neither AR nor F1" in table_page(content, "x")
+
+
+def test_intervals_are_rounded_outward_and_explained(content):
+    assert span([0.996, 0.9999]) == "0.99 to 1.00"
+    assert span([0.84, 1.0]) == "0.84 to 1.00"
+    assert span([-0.0001, 0.2], with_sign=True) == "-0.01 to +0.20"
+    assert span([0.0, 0.123], with_sign=True) == "+0.00 to +0.13"
+    assert span(None) == ""
+    assert "Intervals: 95 %, bootstrap over objects" in table_page(content, "x")
+    constant = next(row for row in tables(table_page(content, "x"))[0] if row[0] == "*constant*")
+    assert constant[2] == "1.000"  # by definition: no interval
+    few = json.loads(json.dumps(content))
+    few["interval_note"] = "No intervals: too few objects."
+    for row in few["models"].values():
+        row["intervals"] = dict.fromkeys(row["intervals"])
+    for gain in few["gains"]:
+        gain["ar_interval"] = gain["ap_interval"] = None
+    page = table_page(few, "x")
+    assert "too few objects" in page and "in parentheses" not in page
+    assert tables(page)[0][2][1] == f"{content['models']['point']['ap']:.3f}"
