@@ -11,11 +11,13 @@ export function refuse(message, seconds = 4) {
 }
 
 export class Commands {
-  // onChange() when a command left or was answered; onStored(command) once it is on the disk.
-  constructor(link, onChange, onStored) {
+  // onChange() when a command left or was answered; onStored(command) once it is on the disk;
+  // telling(said) are the words of a receipt.
+  constructor(link, { onChange, onStored, telling }) {
     this.link = link;
     this.onChange = onChange;
     this.onStored = onStored;
+    this.telling = telling;
     this.pending = null; // the command without an answer yet; a stop never waits in line
   }
 
@@ -39,7 +41,7 @@ export class Commands {
   settle(answer, command, said) {
     if (this.pending?.id === command.id) this.pending = null;
     if (answer.status === "stored" || answer.status === "duplicate") {
-      receipt("stored", answer.message || `stored: ${said}`, answer.message ? 10 : 2.2);
+      receipt("stored", answer.message || this.telling(said), answer.message ? 10 : 2.2);
       play(command.value?.outcome ?? "stored");
       this.onStored(command);
     } else {

@@ -25,8 +25,8 @@ const text = (id, value) => { byId(id).textContent = value; };
 
 const BANNERS = {
   READY: () => ["Getting ready", "The session's next trial comes up."],
-  PLACE_OBJECT: (trial) => [`Place: ${trial.object}`, trial.placed ? "Placed; the robot takes over."
-    : `${trial.again_because ? `Once more (${words(trial.again_because)}). ` : ""}Put it down as in the picture, hands away, then confirm.`],
+  PLACE_OBJECT: (trial) => [`Place: ${words(trial.object)}`, trial.placed ? "Placed; the robot takes over."
+    : `${trial.again_because ? `Once more (${words(trial.again_because)}). ` : ""}Put it down${trial.pictures.length ? " as in the picture" : ""}, hands away, then confirm.`],
   CAPTURE: () => ["Looking", "The camera takes a depth image."],
   REGISTER: () => ["Finding the object", "The mesh is fitted to the image."],
   CONFIRM_POSE: (trial) => ["Which pose is right?", `${1 + (trial.info.rivals ?? []).length} poses explain the image equally well.`],

@@ -27,7 +27,11 @@ const page = {
 };
 
 const link = new Link(token, { onView, onEnd, onHealth: () => draw() });
-const commands = new Commands(link, () => draw(), (command) => actions.settled(command));
+const commands = new Commands(link, {
+  onChange: () => draw(),
+  onStored: (command) => actions.settled(command),
+  telling: (said) => `${page.view?.practice ? "practice" : "stored"}: ${said}`,
+});
 const stage = new Stage(link, onForwardedKey);
 const review = new Review(link, () => draw());
 const about = new About(page, review);

@@ -33,8 +33,15 @@ export class Stage {
     byId("viewer").hidden = chosen !== "recording";
     if (chosen === "recording") this.point(this.loaded.recording.came);
     byId("stage-empty").hidden = Boolean(chosen);
-    byId("stage-empty").textContent = candidates.includes("recording")
-      ? "The recording is drawn, or there is none to look at." : "The view of the trial appears here.";
+    byId("stage-empty").textContent = this.missing(view, candidates);
+  }
+
+  // Why the stage is empty.
+  missing(view, candidates) {
+    if (view.practice) return "Practice has no pictures: nothing lies on the table.";
+    const awaited = candidates.find((name) => !this.loaded[name].gone);
+    if (!candidates.length) return "The view of the trial appears here.";
+    return awaited ? `The ${awaited === "recording" ? awaited : "picture"} is drawn …` : "There is nothing to look at.";
   }
 
   // What may fill the stage now, the best first.
@@ -58,7 +65,7 @@ export class Stage {
     // A picture that came stays while others of its take arrive: only the take makes it old.
     const key = `${this.trial.trial_id}/${this.trial.take}`;
     if (slot.key !== key) {
-      Object.assign(slot, { key, came: null });
+      Object.assign(slot, { key, came: null, gone: false });
       this.fetch(name, slot, key);
     }
     return Boolean(slot.came);
@@ -69,6 +76,7 @@ export class Stage {
     const came = name === "recording" ? await this.recording(trial) : await this.picture(name, trial);
     if (slot.key !== key) return; // another trial is on the stage by now
     slot.came = came;
+    slot.gone = !came;
     this.draw(this.view, this.trial);
   }
 
