@@ -2,36 +2,24 @@
 
 from __future__ import annotations
 
-import os
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
-from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING
 
-from reach.errors import InvalidInputError
+from collection.targets import write_text
+from reach.models.names import ANALYTIC_NAMES
 
 if TYPE_CHECKING:
     from logs.report.agreement import OperatorAgreement
     from logs.report.coverage import PlanCoverage
     from reach.evaluation.table import Evaluation
 
-REPORT_MODELS = (
-    "point",
-    "point-robust",
-    "ellipse",
-    "ellipse-robust",
-    "reach",
-    "reach-robust",
-    "settled",
-    "settled-robust",
-)
-
 
 def write_report(
     sources: Sequence[Path],
     page: Path,
     *,
-    models: Sequence[str] = REPORT_MODELS,
+    models: Sequence[str] = ANALYTIC_NAMES,
     pose_error: str | None = None,
     seed: int = 0,
     backend: str = "threading",
@@ -114,39 +102,3 @@ def _agreement(sources: Sequence[Path]) -> OperatorAgreement | None:
         return None
     found = joint_agreement(SessionFolder.open(path).read_state() for path in sessions)
     return OperatorAgreement(found.pairs, found.agreed, found.kappa, found.interval)
-
-
-def check_targets(paths: Iterable[Path | None]) -> None:
-    """Refuse, before any work, files that could not be written after it.
-
-    Args:
-        paths: files; None for one that was not asked for.
-
-    Raises:
-        InvalidInputError: if one is a folder, or its folder can neither be written to nor made.
-    """
-    for path in (path for path in paths if path is not None):
-        try:
-            if path.is_dir():
-                raise IsADirectoryError(f"{path} is a folder")
-            folder = next(one for one in path.absolute().parents if one.exists())
-            with TemporaryDirectory(prefix=".writing-", dir=folder):
-                pass
-        except OSError as error:
-            raise InvalidInputError(f"cannot write {path}: {error}") from error
-
-
-def write_text(path: Path, text: str) -> None:
-    """Write a file whole: a reader sees the old one or the new one.
-
-    Raises:
-        InvalidInputError: if it cannot be written.
-    """
-    temporary = path.with_name(f".{path.name}.writing-{os.getpid()}")
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        temporary.write_text(text, encoding="utf-8")
-        os.replace(temporary, path)
-    except OSError as error:
-        temporary.unlink(missing_ok=True)
-        raise InvalidInputError(f"cannot write {path}: {error}") from error

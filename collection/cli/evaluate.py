@@ -8,18 +8,17 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from reach.models.names import ANALYTIC_NAMES
+
 if TYPE_CHECKING:
     from reach.evaluation.table import Evaluation
 
-DEFAULT_MODELS = (
-    "point,point-robust,ellipse,ellipse-robust,reach,reach-robust,settled,settled-robust"
-)
 MODELS_HELP = "Comma-separated model names; `all` takes every one, also the slow `dynamic`."
 
 
 def evaluate(
     sources: Annotated[list[Path], typer.Argument(help="Data-set or session folders.")],
-    models: Annotated[str, typer.Option(help=MODELS_HELP)] = DEFAULT_MODELS,
+    models: Annotated[str, typer.Option(help=MODELS_HELP)] = ",".join(ANALYTIC_NAMES),
     as_json: Annotated[
         Path | None, typer.Option("--json", help="Write the results here; - prints them.")
     ] = None,
@@ -61,8 +60,8 @@ def evaluate(
     - `reach evaluate sessions/mon sessions/tue --cross-validate --markdown table.md`
     """
     from collection.analysis.evaluating import chosen_pose_error, evaluation_content, model_names
-    from collection.analysis.reporting import check_targets, write_text
     from collection.cli.evaluation_table import evaluation_table, print_table, progress_bars
+    from collection.targets import check_files, write_text
     from logs.dataset.sources import load_labeled
     from reach.errors import InvalidInputError
     from reach.evaluation.backends import cluster
@@ -73,7 +72,7 @@ def evaluate(
     if jobs != -1 and jobs < 1:
         raise InvalidInputError(f"--jobs is {jobs}, expected 1 or more, or -1 for all cores")
     printed = as_json is not None and str(as_json) == "-"
-    check_targets([None if printed else as_json, markdown, plots and plots / "reliability.svg"])
+    check_files([None if printed else as_json, markdown, plots and plots / "reliability.svg"])
     dataset = load_labeled(sources, unblinded=unblinded)
     error, basis = chosen_pose_error(dataset, pose_error)
     scorers = scorers_of(model_names(models))
@@ -138,10 +137,9 @@ def _command(sources: list[Path], **chosen: object) -> str:
 
 
 def _write_plots(result: Evaluation, folder: Path, *, simulated: bool) -> None:
-    from collection.analysis.reporting import write_text
+    from collection.targets import write_text
     from logs.report.curves import SIMULATED, precision_recall_svg, reliability_svg
 
-    folder.mkdir(parents=True, exist_ok=True)
     mark = SIMULATED if simulated else ""
     write_text(folder / "precision_recall.svg", precision_recall_svg(result, mark=mark))
     write_text(folder / "reliability.svg", reliability_svg(result, mark=mark))

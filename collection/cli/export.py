@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
+from dataclasses import replace
 from pathlib import Path
 from typing import Annotated
 
@@ -18,6 +19,12 @@ def export(
     unblinded: Annotated[
         bool, typer.Option(help="Let labels given after seeing a prediction replace blind ones.")
     ] = False,
+    license_: Annotated[
+        str | None,
+        typer.Option(
+            "--license", help="Terms of use, such as CC-BY-4.0; the sources' own if not given."
+        ),
+    ] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object.")] = False,
 ) -> None:
     """Write the labeled trials of one or more sessions as a data set.
@@ -26,13 +33,18 @@ def export(
     left out and why. The same session gives the same bytes.
 
     - `reach export sessions/monday --to data/monday`
-    - `reach export sessions/mon sessions/tue --to data/week --format all`
+    - `reach export sessions/mon sessions/tue --to data/week --format all --license CC-BY-4.0`
     """
-    from logs.dataset.files import FORMATS, write_dataset
+    from collection.targets import check_new_folder
+    from logs.dataset.files import FORMATS, check_formats, write_dataset
     from logs.dataset.sources import load_labeled
 
     wanted = list(FORMATS) if formats == "all" else _split(formats)
+    check_formats(wanted)
+    check_new_folder(to)
     dataset = load_labeled(sources, unblinded=unblinded)
+    if license_ is not None:
+        dataset = replace(dataset, license=license_)
     manifest = write_dataset(dataset, to, wanted)
     if as_json:
         print(

@@ -41,6 +41,7 @@ def import_(
     - `reach import reach2019 --grasps physical/ --meshes meshes/ --out data/physical`
     - `reach import reach2019 --grasps mug.json --meshes meshes/ --masses grams.json --out data/mug`
     """
+    from collection.targets import check_new_folder
     from logs.dataset.files import write_dataset
     from logs.dataset.from_reach2019 import MassRule, import_reach2019, read_masses
     from reach.arrays import positive
@@ -50,6 +51,7 @@ def import_(
         raise UnknownNameError("import format", format_name, IMPORT_FORMATS)
     if not 0 < infill <= 1:
         raise InvalidInputError(f"--infill is {infill}, expected above 0 and at most 1")
+    check_new_folder(out)
     grams = read_masses(masses) if masses else {}
     rule = MassRule(grams, positive(density, "--density [kg/m3]"), infill)
     ignore = [masses] if masses else []

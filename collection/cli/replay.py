@@ -45,6 +45,7 @@ def replay(
     - `reach replay sessions/monday --web`
     - `reach replay sessions/monday --save monday.rrd --no-viewer`
     """
+    from collection.targets import check_files
     from logs.errors import ViewError
     from logs.view.viewer import show_recordings
 
@@ -56,6 +57,7 @@ def replay(
         raise ViewError("--web opens the viewer in a browser, --no-viewer opens none; choose one")
     if save is not None and save.suffix != ".rrd":
         raise ViewError(f"--save {save}: a recording's name ends in .rrd")
+    check_files([save])
     shown = _session(session, model) if trial is None else [_trial(session, trial, blind=blind)]
     if save is not None:
         _copy(shown[0], save)
@@ -129,6 +131,7 @@ def _copy(view: Path, out: Path) -> None:
     from logs.errors import ViewError
 
     try:
+        out.parent.mkdir(parents=True, exist_ok=True)
         shutil.copyfile(view, out)
     except OSError as error:
         raise ViewError(f"cannot write {out}: {error}") from error

@@ -8,7 +8,7 @@ from typing import Annotated
 
 import typer
 
-from collection.analysis.reporting import REPORT_MODELS
+from reach.models.names import ANALYTIC_NAMES
 
 
 def report(
@@ -17,7 +17,7 @@ def report(
         Path | None, typer.Option(help="The page; report.html in a single source if not given.")
     ] = None,
     models: Annotated[str, typer.Option(help="Comma-separated model names.")] = ",".join(
-        REPORT_MODELS
+        ANALYTIC_NAMES
     ),
     pose_error: Annotated[
         str | None,
@@ -40,11 +40,12 @@ def report(
     - `reach report data/mon data/tue --out week.html --models point-robust,reach-robust`
     """
     from collection.analysis.evaluating import model_names
-    from collection.analysis.reporting import check_targets, write_report
+    from collection.analysis.reporting import write_report
     from collection.cli.evaluation_table import progress_bars
+    from collection.targets import check_files
 
     page = out or (sources[0] / "report.html" if len(sources) == 1 else Path("report.html"))
-    check_targets([page])
+    check_files([page])
     with progress_bars() as progress:
         result = write_report(
             sources,

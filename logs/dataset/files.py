@@ -36,6 +36,20 @@ FORMATS = ("parquet", "csv", "graspgen", "isaac", "acronym", "reach2019")
 SOURCE_RECORDS_NAME = "source_records.jsonl"
 
 
+def check_formats(formats: Sequence[str]) -> None:
+    """Refuse formats that there are not.
+
+    Raises:
+        UnknownNameError: no such format.
+        DatasetError: none is given.
+    """
+    for name in formats:
+        if name not in FORMATS:
+            raise UnknownNameError("export format", name, FORMATS)
+    if not formats:
+        raise DatasetError(f"no export format given; valid: {', '.join(FORMATS)}")
+
+
 def write_dataset(dataset: Dataset, folder: Path, formats: Sequence[str] = FORMATS) -> Manifest:
     """Write a data set into a new folder.
 
@@ -48,11 +62,7 @@ def write_dataset(dataset: Dataset, folder: Path, formats: Sequence[str] = FORMA
         UnknownNameError: no such format.
         DatasetError: no trial to write, or the folder is not empty.
     """
-    for name in formats:
-        if name not in FORMATS:
-            raise UnknownNameError("export format", name, FORMATS)
-    if not formats:
-        raise DatasetError(f"no export format given; valid: {', '.join(FORMATS)}")
+    check_formats(formats)
     if not dataset.trials:
         raise DatasetError(
             f"{dataset.name!r} holds no labeled trial: {len(dataset.left_out)} planned ones are "

@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
-import numpy as np
-
-from logs.dataset.dataset import Dataset, StatedPoseError
+from logs.dataset.dataset import Dataset
 from logs.dataset.labeled_trial import Execution, Label, LabeledTrial, LeftOut, StoredScore
-from logs.dataset.registration_residual import claimed_variances
+from logs.dataset.station_error import (
+    StationError,
+    session_pose_error,
+    station_error,
+    table_height,
+)
 from logs.errors import DatasetError
 from logs.journal.events import LabelEvent, Outcome, Scored
 from logs.journal.state import TakeState, TrialState
@@ -45,9 +48,12 @@ def session_dataset(path: Path, *, unblinded: bool = False) -> Dataset:
     name = path.resolve().name
     counted = [trial for trial in state.order if trial.status == "labelled"]
     facts = read_facts([_record_path(path, trial) for trial in counted])
-    attempts, table = _attempts(state.order), _table_height(folder)
+    attempts = _attempts(state.order)
+    table, station = table_height(folder), station_error(folder)
     trials = tuple(
-        _labeled_trial(trial, one, name, attempts[trial.planned.grasp_id], table, unblinded)
+        _labeled_trial(
+            trial, one, name, attempts[trial.planned.grasp_id], table, station, unblinded
+        )
         for trial, one in zip(counted, facts, strict=True)
     )
     return Dataset(
@@ -58,7 +64,7 @@ def session_dataset(path: Path, *, unblinded: bool = False) -> Dataset:
         gripper=_gripper(facts),
         trials=trials,
         left_out=tuple(_left_out(t, name) for t in state.order if t.status != "labelled"),
-        pose_error=_pose_error(trials, _station_error(folder)),
+        pose_error=session_pose_error(trials, station),
         notes=_notes(counted, unblinded),
     )
 
@@ -117,7 +123,8 @@ def _labeled_trial(
     facts: RecordFacts,
     session: str,
     attempt: int,
-    table_height: float,
+    height: float,
+    station: StationError | None,
     unblinded: bool,
 ) -> LabeledTrial:
     """One row; a plan's poses rest on a table at zero and are lifted to the station's."""
@@ -134,13 +141,13 @@ def _labeled_trial(
         attempt=attempt,
         repeat=planned.repeat,
         stable_pose=described.stable_pose,
-        T_world_object=make_transform(None, (0, 0, table_height)) @ described.T_world_object,
+        T_world_object=make_transform(None, (0, 0, height)) @ described.T_world_object,
         T_object_gripper=described.planned.T_object_gripper,
-        table_height=table_height,
+        table_height=height,
         opening=described.planned.opening,
         force=described.planned.force,
         label=_label(take, unblinded),
-        execution=_execution(take, facts),
+        execution=_execution(take, facts, station),
         scores={model: _score(event) for model, event in sorted(take.scores.items())},
         takes=len(trial.takes),
         redos=tuple(t.ended_because for t in redone),
@@ -184,13 +191,17 @@ def _label(take: TakeState, unblinded: bool) -> Label:
     )
 
 
-def _execution(take: TakeState, facts: RecordFacts) -> Execution:
+def _execution(take: TakeState, facts: RecordFacts, station: StationError | None) -> Execution:
     found, done = facts.registration, facts.execution
+    covariance = None if found is None else found.covariance
     width = take.sensor.jaw_width if take.sensor else None
     measured: Mapping[str, float] = done.measurements if done else {}
     return Execution(
         T_world_object=None if found is None else found.T_world_object,
-        covariance=None if found is None else found.covariance,
+        covariance=covariance,
+        covariance_in_hand=(
+            None if covariance is None or station is None else station.beside(covariance)
+        ),
         T_world_gripper=None if done is None else done.T_world_gripper,
         T_object_gripper=None if done is None else done.executed.T_object_gripper,
         jaw_width=width if width is not None else measured.get("width"),
@@ -222,74 +233,6 @@ def _left_out(trial: TrialState, session: str) -> LeftOut:
     return LeftOut(
         trial.trial_id, session, planned.number, planned.object_name, planned.grasp_id, reason
     )
-
-
-def _station_section(folder: SessionFolder, name: str) -> dict[str, float]:
-    """The numbers in a section of the station file; empty if there is no such section."""
-    station = folder.descriptor.config.get("station")
-    section = station.get(name) if isinstance(station, dict) else None
-    items = section.items() if isinstance(section, dict) else ()
-    return {key: float(value) for key, value in items if isinstance(value, int | float)}
-
-
-def _table_height(folder: SessionFolder) -> float:
-    """World z of the station's table [m]; zero where no station file says otherwise."""
-    return _station_section(folder, "workspace").get("table_height", 0.0)
-
-
-def _station_error(folder: SessionFolder) -> tuple[float, float, str] | None:
-    """Variances of translation [m^2] and rotation [rad^2] that are known of a station, and whence.
-
-    Its section `pose_error` holds standard deviations named by cause: calibration, actuation.
-    """
-    numbers = _station_section(folder, "pose_error")
-    source = _pose_error_source(folder)
-    if not numbers or source == "unknown":
-        return None
-    translation = sum(v * v for key, v in numbers.items() if key.endswith("_translation"))
-    rotation = sum(v * v for key, v in numbers.items() if key.endswith("_rotation"))
-    whence = "calibration and actuation as the station file states them"
-    if source == "calibration":
-        whence = "the calibration's residuals (actuation is not stated)"
-    return translation, rotation, whence
-
-
-def _pose_error_source(folder: SessionFolder) -> str:
-    """Who says how large the station's errors are; sessions before this was kept: the file."""
-    station = folder.descriptor.config.get("station")
-    section = station.get("pose_error") if isinstance(station, dict) else None
-    return str(section.get("source", "stated")) if isinstance(section, dict) else "unknown"
-
-
-def _pose_error(
-    trials: Iterable[LabeledTrial], station: tuple[float, float, str] | None
-) -> StatedPoseError | None:
-    """Root mean square of the registrations' own deviations, and the station's beside them.
-
-    Args:
-        trials: those that count.
-        station: variances of calibration and actuation together, and whence; None if not stated.
-    """
-    claimed = claimed_variances(trials)
-    if claimed is None:
-        return None
-    variances, count = claimed
-    translation, rotation = variances[3:].mean(), variances[:3].mean()
-    basis = f"root mean square of {count} registrations' stated covariances"
-    if station is not None:
-        translation, rotation = translation + station[0], rotation + station[1]
-        basis += f", and {station[2]}"
-    else:
-        basis += "; calibration and actuation not stated, and not included"
-    return StatedPoseError(_stated(translation), _stated(rotation), basis)
-
-
-def _stated(variance: float) -> float:
-    """Standard deviation to two digits: more are noise, and every new trial would change them.
-
-    Cached scores hold under one pose error; a session that goes on keeps them.
-    """
-    return float(f"{np.sqrt(variance):.1e}")
 
 
 def _notes(trials: Sequence[TrialState], unblinded: bool) -> tuple[str, ...]:

@@ -49,6 +49,9 @@ class Execution:
         T_world_object: registered pose, shape (4, 4).
         covariance: of it, shape (6, 6), (rotation [rad], translation [m]), object frame; a
             turn about an axis of symmetry has the variance of a full turn.
+        covariance_in_hand: of the object's pose relative to the gripper, shape (6, 6), object frame:
+            `covariance` with the station's stated errors of calibration and actuation, which all
+            trials under one set-up share; None where the station states none.
         T_world_gripper: measured when the jaws had closed, shape (4, 4).
         T_object_gripper: the grasp as executed on the registered object, shape (4, 4).
         jaw_width: between the pads at the end of the hold [m].
@@ -61,6 +64,7 @@ class Execution:
 
     T_world_object: FloatArray | None = None
     covariance: FloatArray | None = None
+    covariance_in_hand: FloatArray | None = None
     T_world_gripper: FloatArray | None = None
     T_object_gripper: FloatArray | None = None
     jaw_width: float | None = None
@@ -75,13 +79,19 @@ class Execution:
             value = getattr(self, name)
             if value is not None:
                 object.__setattr__(self, name, as_transform(value, name))
-        if self.covariance is not None:
-            covariance = frozen(self.covariance)
-            if covariance.shape != (6, 6) or not np.isfinite(covariance).all():
-                raise InvalidInputError(
-                    f"pose covariance has shape {covariance.shape}, expected (6, 6) finite numbers"
-                )
-            object.__setattr__(self, "covariance", covariance)
+        for name in ("covariance", "covariance_in_hand"):
+            value = getattr(self, name)
+            if value is not None:
+                object.__setattr__(self, name, _covariance(value))
+
+
+def _covariance(value: FloatArray) -> FloatArray:
+    covariance = frozen(value)
+    if covariance.shape != (6, 6) or not np.isfinite(covariance).all():
+        raise InvalidInputError(
+            f"pose covariance has shape {covariance.shape}, expected (6, 6) finite numbers"
+        )
+    return covariance
 
 
 @dataclass(frozen=True, slots=True)

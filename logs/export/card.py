@@ -102,6 +102,13 @@ def _caveats(dataset: Dataset, tops: Iterable[str]) -> list[str]:
             "In reach2019 files written from recorded sessions, `tf` carries the planned to the "
             "registered pose in the world, and the published models' `qs_*` predictions are absent."
         )
+    if any(trial.execution.covariance_in_hand is not None for trial in dataset.trials):
+        caveats.append(
+            "Errors of calibration and hand are common to all trials under one set-up (a segment of "
+            "a session): every trial is shifted alike. A robust score draws them anew in each of "
+            "its samples, so that it is a chance over stations of this kind, and a session's labels "
+            "may lie to one side of it together."
+        )
     if dataset.pose_error is None:
         caveats.append("No pose error is stated: pass --pose-error to `reach evaluate`.")
     caveats.append("Trials of one grasp are repeats, not independent samples of all grasps.")

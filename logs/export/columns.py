@@ -126,10 +126,20 @@ BASE_COLUMNS: tuple[Column, ...] = (
     Column(
         "registration_covariance",
         "numbers",
-        "of the registered pose, 6x6 row-major, (rotation, translation), object frame, as "
-        "registration states it in the camera's frame: without the calibration and hand errors, "
-        "which shift all trials of a station alike",
+        "of the registered pose relative to the camera, 6x6 row-major, (rotation, translation), "
+        "right perturbation in the object's frame, as registration states it: without the errors "
+        "of calibration and hand",
         lambda t: _flat(t.execution.covariance),
+        "rad, m",
+        nullable=True,
+    ),
+    Column(
+        "object_in_hand_covariance",
+        "numbers",
+        "of the object's pose relative to the gripper, 6x6 row-major, (rotation, translation), "
+        "right perturbation in the object's frame: registration_covariance with calibration and "
+        "actuation as the station states them, which are common to the trials of a segment",
+        lambda t: _flat(t.execution.covariance_in_hand),
         "rad, m",
         nullable=True,
     ),
@@ -253,6 +263,7 @@ def trial_of_row(row: dict[str, Any], models: Iterable[str]) -> LabeledTrial:
     execution = Execution(
         T_world_object=_matrix(row["T_world_object_registered"], 4),
         covariance=_matrix(row["registration_covariance"], 6),
+        covariance_in_hand=_matrix(row["object_in_hand_covariance"], 6),
         T_world_gripper=_matrix(row["T_world_gripper_executed"], 4),
         T_object_gripper=_matrix(row["T_object_gripper_executed"], 4),
         jaw_width=row["jaw_width"],

@@ -84,12 +84,11 @@ def croissant_bytes(dataset: Dataset, hashes: Mapping[str, str]) -> bytes:
             f"{kind} grasp trials with success labels: {len(dataset.trials)} trials of "
             f"{len(dataset.objects)} objects. {dataset.origin}"
         ),
+        "license": dataset.license or "not stated",
         "isLiveDataset": False,
         "distribution": [_file(name, hashes[name]) for name in tables],
         "recordSet": [_record_set(dataset, tables[0])] if tables else [],
     }
-    if dataset.license:
-        content["license"] = dataset.license
     return (json.dumps(content, indent=1) + "\n").encode()
 
 

@@ -73,7 +73,10 @@ def build_dataset(objects=3, grasps=4, repeats=2, seed=0, faces=12, simulated=Tr
                         ),
                         execution=Execution(
                             T_world_object=registered,
-                            covariance=np.diag([np.pi**2 / 3 if number == 1 else 1e-6] + [1e-6] * 5),
+                            covariance=np.diag(
+                                [np.pi**2 / 3 if number == 1 else 1e-6] + [1e-6] * 5
+                            ),
+                            covariance_in_hand=None if number == 6 else np.eye(6) * 2e-6,
                             T_world_gripper=registered @ T_object_gripper,
                             T_object_gripper=T_object_gripper,
                             jaw_width=0.021 if lifted else None,

@@ -88,6 +88,25 @@ def test_export_refuses_unknown_formats_and_full_folders(folder, tmp_path, capsy
     assert not (tmp_path / "x").exists()
 
 
+@pytest.mark.parametrize("command", ["export", "import"])
+def test_unwritable_folders_are_refused_before_the_work(folder, tmp_path, capsys, command):
+    """Missing folders above a target are made; a file in the way is told at once."""
+    (tmp_path / "file").touch()
+    given = {
+        "export": ["export", str(folder), "--to"],
+        "import": ["import", "reach2019", "--grasps", "none", "--meshes", "none", "--out"],
+    }[command]
+    for target in (tmp_path / "file", tmp_path / "file" / "d"):
+        with pytest.MonkeyPatch.context() as patch:
+            patch.setattr("logs.dataset.sources.load_labeled", None)
+            patch.setattr("logs.dataset.from_reach2019.import_reach2019", None)
+            assert main([*given, str(target)]) == 2
+        assert "cannot write" in capsys.readouterr().err
+    deep = tmp_path / "made" / "deep" / "d"
+    assert main(["export", str(folder), "--to", str(deep), "--license", "MIT"]) == 0
+    assert "| license | MIT |" in (deep / "README.md").read_text()
+
+
 def test_export_all_then_import_again(folder, tmp_path, capsys):
     out = tmp_path / "all"
     assert main(["export", str(folder), "--to", str(out), "--format", "all", "--json"]) == 0

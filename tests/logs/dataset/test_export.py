@@ -7,7 +7,7 @@ import os
 import signal
 import subprocess
 import sys
-from dataclasses import fields
+from dataclasses import fields, replace
 
 import h5py
 import mlcroissant
@@ -193,6 +193,7 @@ def test_croissant_is_valid_and_loads_the_table(written):
     dataset, folder = written
     described = mlcroissant.Dataset(jsonld=folder / "croissant.json")
     assert described.metadata.issues.errors == set()
+    assert described.metadata.license == ["not stated"]
     rows = list(described.records("trials"))
     assert len(rows) == len(dataset.trials)
     first = rows[0]
@@ -214,6 +215,26 @@ def test_card_counts_what_is_there_and_what_is_not(written):
     assert "1 redone, 1 void; 1 labels replace an earlier one" in card
     assert "T_parent_child maps child coordinates to parent" in card
     assert "jaws open 50 mm" in card
+
+
+def test_license_stands_where_people_and_machines_look(make_dataset, tmp_path, written):
+    assert "| license | not stated |" in (written[1] / "README.md").read_text()
+    licensed = replace(make_dataset(objects=1), license="CC-BY-4.0")
+    write_dataset(licensed, tmp_path / "d", ("parquet",))
+    assert "| license | CC-BY-4.0 |" in (tmp_path / "d" / "README.md").read_text()
+    assert json.loads((tmp_path / "d" / "croissant.json").read_text())["license"] == "CC-BY-4.0"
+    assert read_dataset(tmp_path / "d").license == "CC-BY-4.0"
+
+
+def test_both_covariances_are_named_with_their_frames(written):
+    table = pd.read_parquet(written[1] / "trials.parquet")
+    registered = np.reshape(table["registration_covariance"][2], (6, 6))
+    in_hand = np.reshape(table["object_in_hand_covariance"][2], (6, 6))
+    np.testing.assert_array_equal(registered, np.eye(6) * 1e-6)
+    np.testing.assert_array_equal(in_hand, np.eye(6) * 2e-6)
+    card = (written[1] / "README.md").read_text()
+    assert "relative to the camera" in card and "relative to the gripper" in card
+    assert "common to all trials under one set-up" in card
 
 
 def test_manifest_hashes_every_file(written):
@@ -292,8 +313,6 @@ def test_merging_keeps_equal_grasps_and_parts_different_ones(make_dataset):
 
 
 def _with_trials(dataset, change):
-    from dataclasses import replace
-
     trials = tuple(
         replace(t, **(change | {"trial_id": f"{change['session']}-{t.trial_id}"}))
         for t in dataset.trials

@@ -155,6 +155,7 @@ def test_same_session_same_bytes_and_two_sessions_join(session, recorded, tmp_pa
 
 def test_station_errors_add_to_the_registrations_own(session):
     plain = session_dataset(session.path).pose_error
+    assert session_dataset(session.path).trials[0].execution.covariance_in_hand is None
     path = session.path / "session.json"
     content = json.loads(path.read_text())
     content["config"] = {
@@ -168,7 +169,11 @@ def test_station_errors_add_to_the_registrations_own(session):
         }
     }
     path.write_text(json.dumps(content))
+    trials = session_dataset(session.path).trials
     stated = session_dataset(session.path).pose_error
+    for trial in trials:
+        added = trial.execution.covariance_in_hand - trial.execution.covariance
+        np.testing.assert_allclose(np.diag(added), [0, 0, 0, 25e-6, 25e-6, 25e-6], rtol=1e-9)
     assert stated.translation == pytest.approx(np.hypot(plain.translation, 5e-3), rel=0.05)
     assert stated.rotation == plain.rotation
     for value in (stated.translation, stated.rotation):
