@@ -28,6 +28,8 @@ TURNED_OVER = 2
 COARSE_PIXELS, FINE_PIXELS = 500, 5000
 """Pixels of the part that a render check looks at, about."""
 COARSE_STEPS, FINE_STEPS = 12, 6
+SCREENING, SCREENED, FEWEST_KEPT = 5, 1 / 3, 144
+"""After so many coarse steps this share of the starts goes on, but no fewer than so many."""
 HOPELESS = 0.2
 """A hypothesis whose render cost is this far above the best one's is not refined."""
 BASIN = np.radians(8.0)
@@ -114,9 +116,7 @@ class Search:
             self.seen.points.mean(axis=0),
             self.seen.table.normal_camera if planar else None,
         )
-        T, loss = self._align(
-            _lift(T_table_camera, placed), coarse, self._coarse_scales(), planar=planar
-        )
+        T, names, loss = self._screened(_lift(T_table_camera, placed), names, coarse, planar=planar)
         score = loss + seen_through(
             self.model, self.seen, _lift(T_camera_table, T), max(3e-3, 4 * self.noise)
         )
@@ -129,6 +129,16 @@ class Search:
         order = order[: KEPT_RENDERED if planar else KEPT_RENDERED_FREE]
         order = order[check.cost[order] <= check.cost[order[0]] + HOPELESS]
         return self._finish(T[order], names[order], fine, planar=planar)
+
+    def _screened(
+        self, T: FloatArray, names: IntArray, points: FloatArray, *, planar: bool
+    ) -> tuple[FloatArray, IntArray, FloatArray]:
+        """Starts aligned at falling scales, their names and losses; most are given up on the way."""
+        scales = self._coarse_scales()
+        T, loss = self._align(T, points, scales[:SCREENING], planar=planar)
+        order = np.argsort(loss, kind="stable")[: max(FEWEST_KEPT, int(SCREENED * len(T)))]
+        T, loss = self._align(T[order], points, scales[SCREENING:], planar=planar)
+        return T, names[order], loss
 
     def from_starts(
         self, T_table_object: FloatArray, names: IntArray, *, planar: bool
