@@ -12,9 +12,8 @@ from pathlib import Path
 from logs.errors import RecordReadError
 from logs.record.descriptions import GRIPPER_DESCRIPTION, read_gripper
 from logs.record.mesh_attachment import OBJECT_MESH, read_mesh
-from logs.record.outline import read_outline
+from logs.record.outline import read_attachment, read_outline
 from logs.record.records import ExecutionRecord, RegistrationRecord, TrialDescriptor
-from logs.record.trial_record import read_record
 from reach.arrays import FloatArray, IntArray
 from reach.gripper import ParallelJawGripper
 
@@ -40,18 +39,12 @@ class RecordFacts:
     @property
     def mesh(self) -> tuple[FloatArray, IntArray]:
         """Vertices and faces of the object, read from the record now."""
-        return read_mesh(self._attachment(OBJECT_MESH))
+        return read_mesh(read_attachment(self.path, OBJECT_MESH))
 
     @property
     def gripper(self) -> ParallelJawGripper:
         """The hand, read from the record now."""
-        return read_gripper(self._attachment(GRIPPER_DESCRIPTION))
-
-    def _attachment(self, name: str) -> bytes:
-        attachments = read_record(self.path, images=False).attachments
-        if name not in attachments:
-            raise RecordReadError(f"{self.path} holds no {name}; it has: {', '.join(attachments)}")
-        return attachments[name].data
+        return read_gripper(read_attachment(self.path, GRIPPER_DESCRIPTION))
 
 
 def read_facts(paths: Sequence[Path]) -> list[RecordFacts]:

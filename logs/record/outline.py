@@ -17,6 +17,7 @@ from logs.errors import RecordReadError
 from logs.record import topics
 from logs.record.decode_streams import decode_colors, decode_depths
 from logs.record.decode_v1 import decode_record
+from logs.record.indexed import indexed_messages
 from logs.record.mcap_walk import RawMessage
 from logs.record.records import FORMAT_VERSION
 from logs.record.streams import ColorImage, DepthImage
@@ -35,7 +36,7 @@ def read_outline(path: Path) -> TrialRecord:
     """
     try:
         with path.open("rb") as stream:
-            found = list(_messages(_reader(stream), _RESULTS))
+            found = indexed_messages(stream, _RESULTS)
     except OSError as error:
         raise RecordReadError(f"cannot read {path}: {error}") from error
     except Exception:  # any parser may meet any error in damaged bytes; reading whole tells which
@@ -46,6 +47,22 @@ def read_outline(path: Path) -> TrialRecord:
     if v1.TrialStart.FromString(found[0].data).format_version != FORMAT_VERSION:
         return read_record(path, images=False)
     return decode_record(path, found, {}, None)
+
+
+def read_attachment(path: Path, name: str) -> bytes:
+    """Read one file that a record carries.
+
+    Raises:
+        RecordReadError: if the record cannot be read or holds no such file.
+    """
+    try:
+        with path.open("rb") as stream:
+            found = {one.name: one.data for one in _reader(stream).iter_attachments()}
+    except Exception:  # as above
+        found = {one.name: one.data for one in read_record(path, images=False).attachments.values()}
+    if name not in found:
+        raise RecordReadError(f"{path} holds no {name}; it has: {', '.join(found) or 'none'}")
+    return bytes(found[name])
 
 
 def first_image(path: Path) -> ColorImage | DepthImage | None:
