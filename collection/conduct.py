@@ -8,6 +8,7 @@ from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
 from dataclasses import asdict
 from pathlib import Path
+from shlex import quote
 from typing import TYPE_CHECKING, Literal
 
 from rich.console import Console
@@ -213,7 +214,9 @@ def _sum_up(asked: Conduct, folder: SessionFolder, terminal: Console) -> None:
         return
     terminal.print(summary_table(rows, simulated=folder.descriptor.simulated))
     terminal.print(f"session  {folder.path}", markup=False, highlight=False)
-    terminal.print(f"replay   reach replay {folder.path}", markup=False, highlight=False)
+    terminal.print(
+        f"replay   reach replay {quote(str(folder.path))}", markup=False, highlight=False
+    )
     if written is not None:
         terminal.print(f"report   {written}", markup=False, highlight=False)
 

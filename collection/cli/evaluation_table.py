@@ -156,13 +156,18 @@ def progress_bars() -> Iterator[Callable[[str, int, int], None]]:
         MofNCompleteColumn(),
         TimeRemainingColumn(),
     )
-    with Progress(*columns, console=Console(stderr=True), transient=True) as bars:
-        tasks: dict[tuple[str, int], TaskID] = {}
+    bars = Progress(*columns, console=Console(stderr=True), transient=True)
+    tasks: dict[tuple[str, int], TaskID] = {}
 
-        def report(name: str, done: int, total: int) -> None:
-            key = (name, total)
-            if key not in tasks:
-                tasks[key] = bars.add_task(name, total=total)
-            bars.update(tasks[key], completed=done)
+    def report(name: str, done: int, total: int) -> None:
+        bars.start()  # not before: bad input is told in one line
+        key = (name, total)
+        if key not in tasks:
+            tasks[key] = bars.add_task(name, total=total)
+        bars.update(tasks[key], completed=done)
 
+    try:
         yield report
+    finally:
+        if tasks:
+            bars.stop()

@@ -12,12 +12,14 @@ if TYPE_CHECKING:
     from logs.dataset.registration_scatter import RegistrationScatter, Spread
     from reach.evaluation.fit import Fit
 
+FITTED = ("reach-robust", "ellipse-robust", "settled-robust")
+"""Models that have all the parameters to be fitted."""
 UNITS = {"friction": "", "compliance": " m/N", "stiffness": " N/m^3", "translation": " m"}
 
 
 def fit(
     sources: Annotated[list[Path], typer.Argument(help="Session or data-set folders.")],
-    model: Annotated[str, typer.Option(help="A robust model.")] = "reach-robust",
+    model: Annotated[str, typer.Option(help=f"One of {', '.join(FITTED)}.")] = "reach-robust",
     samples: Annotated[int, typer.Option(min=1, help="Perturbations a score.")] = 50,
     seed: Annotated[int, typer.Option(help="Of the perturbations.")] = 0,
     backend: Annotated[
@@ -38,9 +40,12 @@ def fit(
     from collection.cli.evaluation_table import progress_bars
     from logs.dataset.registration_scatter import registration_scatter
     from logs.dataset.sources import load_labeled
+    from reach.errors import UnknownNameError
     from reach.evaluation.fit import fit_parameters
     from reach.models.registry import make_scorer
 
+    if model not in FITTED:
+        raise UnknownNameError("robust model of pads", model, FITTED)
     dataset = load_labeled(sources)
     scatter = registration_scatter(dataset.trials)
     with progress_bars() as progress:

@@ -54,6 +54,8 @@ def label(
 
     if practice == (session is not None):
         raise InvalidInputError("name one session's folder, or --practice without one")
+    if as_json and not agreement:
+        raise InvalidInputError("--json goes with --agreement")
     if agreement and session is not None:
         _print_agreement(session, as_json=as_json)
         return

@@ -6,7 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from reach.arrays import FloatArray, IntArray
+from reach.arrays import FloatArray, IntArray, positive
+from reach.errors import InvalidInputError
 from reach.objects import PLA_DENSITY, volume_and_centroid
 
 
@@ -21,11 +22,20 @@ class PrintSettings:
         wall: thickness of the solid shell [m]; one line of a 0.4 mm nozzle.
         infill: share of the inside that is filled.
         density: of the filament [kg/m^3].
+
+    Raises:
+        InvalidInputError: a value that no print has.
     """
 
     wall: float = 4e-4
     infill: float = 0.05
     density: float = PLA_DENSITY
+
+    def __post_init__(self) -> None:
+        positive(self.wall, "wall [m]")
+        positive(self.density, "density [kg/m^3]")
+        if not 0.0 <= self.infill <= 1.0:
+            raise InvalidInputError(f"infill is {self.infill!r}, expected 0 to 1")
 
 
 LIGHT_PRINT = PrintSettings()

@@ -90,6 +90,21 @@ def test_an_open_mesh_is_refused(capsys, tmp_path):
     assert "watertight" in refused(capsys, *collect(tmp_path / "S", objects=mesh))
 
 
+@pytest.mark.parametrize(
+    ("words", "named"),
+    [
+        ("objects cube_3cm --wall nan", ["wall", "nan"]),
+        ("objects cube_3cm --wall -1", ["wall", "-0.001"]),
+        ("label S --json", ["--json", "--agreement"]),
+        ("fit S --model point", ["point", "settled-robust"]),
+    ],
+)
+def test_options_that_mean_nothing_are_refused(capsys, words, named):
+    line = refused(capsys, *words.split())
+    for word in named:
+        assert word in line
+
+
 @pytest.mark.parametrize("command", ["status", "replay", "recover"])
 def test_no_session_there(capsys, tmp_path, command):
     assert "session" in refused(capsys, command, tmp_path / "nothing")
