@@ -14,7 +14,8 @@ from labeling.view import console_view
 TICK_PERIOD: Final = 0.5
 """Seconds between ticks; a console that misses several shows red and sends nothing."""
 VIEW_GAP: Final = 0.04
-"""Seconds between views: changes come in bursts, and each view costs the server and the page."""
+"""Seconds from a change to its view: changes come in bursts, each view costs the server and the
+page, and a command's answer goes out before the view that it brings about is drawn."""
 
 
 def _message(event: str, data: object) -> bytes:
@@ -54,13 +55,14 @@ async def console_stream(console: Console, streams: Streams) -> AsyncIterator[by
     try:
         shown = -1
         while not streams.leaving:
+            if shown >= 0 and console.controller.version != shown:
+                await asyncio.sleep(VIEW_GAP)
             changed.clear()
             closed = console.controller.closed  # asked first: the last view tells of the end
             if console.controller.version != shown:
                 view = await asyncio.to_thread(console_view, console)
                 shown = view["version"]
                 yield _message("state", view)
-                await asyncio.sleep(VIEW_GAP)
             else:
                 yield _message("tick", {"tick": console.controller.tick(), "version": shown})
             if closed:

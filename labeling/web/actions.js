@@ -25,7 +25,7 @@ export class Actions {
   // `action`: a name, {digit: n}, or {other: key}.
   perform(action) {
     const { page } = this;
-    allowSound();
+    setTimeout(allowSound); // after the action: the first time it takes the browser a while
     if (!page.view && action !== "stop") return undefined;
     if (action.digit !== undefined) return this.choices()[action.digit - 1]?.run();
     if (action.other === "x") return this.leave();

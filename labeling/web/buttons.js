@@ -1,7 +1,7 @@
 // The buttons below: which there are now, which may be pressed, and what can be chosen by a digit.
 
 import { decisionWord } from "/actions.js";
-import { byId, element, redraw } from "/draw.js";
+import { byId, element, redraw, text } from "/draw.js";
 
 // `judging`: verdicts are taken; `usable`: everything else is.
 export function drawActions(page, state, about, usable, judging) {
@@ -17,8 +17,8 @@ export function drawActions(page, state, about, usable, judging) {
   byId("do-rotated").setAttribute("aria-pressed", String(page.rotated));
   const earlier = reviewing && about?.label;
   may("do-undo", Boolean(view.undoable || earlier));
-  byId("undo-text").textContent = view.undoable ? `Undo ${decisionWord(view.undoable.kind)} of ${view.undoable.number}`
-    : earlier ? `Take back ${about.number}'s label …` : "Undo";
+  text("undo-text", view.undoable ? `Undo ${decisionWord(view.undoable.kind)} of ${view.undoable.number}`
+    : earlier ? `Take back ${about.number}'s label …` : "Undo");
   const moving = view.trial?.phase === "EXECUTE";
   for (const id of ["do-redo", "do-skip"]) {
     byId(id).hidden = reviewing;
@@ -26,7 +26,7 @@ export function drawActions(page, state, about, usable, judging) {
   }
   byId("do-pause").hidden = reviewing;
   may("do-pause", true);
-  byId("pause-text").textContent = view.paused ? "Resume" : "Pause";
+  text("pause-text", view.paused ? "Resume" : "Pause");
 }
 
 // `offered`: [{text, run}], in the order of the digits; `pressed()` comes before each run.

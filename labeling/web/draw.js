@@ -21,7 +21,12 @@ export function redraw(box, content, build) {
 
 const words = (value) => String(value ?? "").replaceAll("_", " ");
 const show = (id, visible) => { byId(id).hidden = !visible; };
-const text = (id, value) => { byId(id).textContent = value; };
+
+// The same words again would cost the browser a new layout.
+export function text(id, value) {
+  const shown = byId(id);
+  if (shown.textContent !== String(value)) shown.textContent = value;
+}
 
 const BANNERS = {
   READY: () => ["Getting ready", "The session's next trial comes up."],
@@ -84,25 +89,28 @@ function bar(share) {
   return element("div", { className: "bar" }, filled);
 }
 
-export function drawBanner(state, trial, view, problem) {
+// `again`: the past trial whose label is given again, null if there is none.
+export function drawBanner(state, view, problem, again) {
   document.body.dataset.state = state;
-  let [title, more] = state === "HELD"
-    ? ["The station holds", Object.values(view.holds).join("; ")]
-    : BANNERS[state](trial ?? {});
-  if (state === "LOST") more = problem || "Keys do nothing until it is back. The robot finishes its motion and holds.";
-  if (state === "STOPPED" || state === "PAUSED") more = [more, ...Object.values(view.holds)].join(" ");
-  if (view?.paused && state === "AWAITING_LABEL") more += " (The session is paused.)";
+  document.body.dataset.target = again ? "relabel" : "";
+  const [title, more] = again ? againBanner(again, view) : stateBanner(state, view, problem);
   text("banner-title", title);
   text("banner-text", more);
   show("clear-stop", state === "STOPPED");
+  show("cancel-target", again && view.mode === "run");
 }
 
-export function drawRelabelBanner(trial) {
-  document.body.dataset.target = trial ? "relabel" : "";
-  show("cancel-target", Boolean(trial));
-  if (!trial) return;
-  text("banner-title", `Label trial ${trial.number} again: ${trial.object}`);
-  text("banner-text", trial.label ? `It says ${describeLabel(trial.label)}.` : "It has no label now.");
+function stateBanner(state, view, problem) {
+  if (state === "HELD") return ["The station holds", Object.values(view.holds).join("; ")];
+  const [title, more] = BANNERS[state](view?.trial ?? {});
+  if (state === "LOST") return [title, problem || "Keys do nothing until it is back. The robot finishes its motion and holds."];
+  if (state === "STOPPED" || state === "PAUSED") return [title, [more, ...Object.values(view.holds)].join(" ")];
+  return [title, view?.paused && state === "AWAITING_LABEL" ? `${more} (The session is paused.)` : more];
+}
+
+function againBanner(trial, view) {
+  if (view.second) return [`Trial ${trial.number}: was it stably lifted?`, trial.label ? `You said ${describeLabel(trial.label)}.` : "You have not judged it yet."];
+  return [`Label trial ${trial.number} again: ${words(trial.object)}`, trial.label ? `It says ${describeLabel(trial.label)}.` : "It has no label now."];
 }
 
 export function drawTrial(trial, state) {
@@ -124,13 +132,12 @@ export function drawTrial(trial, state) {
 function drawRegistration(registration) {
   show("registration", Boolean(registration));
   if (!registration) return;
-  const numbers = Object.entries(registration).flatMap(([name, value]) => [
+  redraw(byId("registration-numbers"), registration, () => Object.entries(registration).flatMap(([name, value]) => [
     element("dt", { textContent: words(name) }),
     element("dd", {
       textContent: typeof value === "number" ? value.toPrecision(3) : words(Array.isArray(value) ? value.join(", ") || "none" : value),
       className: value === true && name === "ambiguous" ? "poor" : "",
-    })]);
-  byId("registration-numbers").replaceChildren(...numbers);
+    })]));
 }
 
 export function describeLabel(label) {

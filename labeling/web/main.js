@@ -3,7 +3,7 @@
 import { About } from "/about.js";
 import { Actions } from "/actions.js";
 import { drawActions, drawChoices } from "/buttons.js";
-import { byId, drawBanner, drawRelabelBanner, drawSession, drawTime, drawTrial, redraw, trialItem } from "/draw.js";
+import { byId, drawBanner, drawSession, drawTime, drawTrial, redraw, trialItem } from "/draw.js";
 import { Commands, refuse } from "/commands.js";
 import { Keys, isTextField } from "/keys.js";
 import { drawKeyTable, drawLegend } from "/legend.js";
@@ -128,15 +128,13 @@ function paint() {
   const { view } = page;
   const state = effectiveState();
   byId("unconfirmed").hidden = !commands.pending?.unconfirmed;
-  if (!view) return drawBanner(state, null, null, link.problem);
+  if (!view) return drawBanner(state, null, link.problem, null);
   drawSession(view, link.alive);
   const target = about.target();
   const past = target?.kind === "relabel" && view.mode === "run";
   const trial = view.mode === "review" ? review.shown(view) : past ? shownAgain(target) : view.trial;
-  drawBanner(state, view.trial, view, link.problem);
-  const again = view.mode === "review" || past ? target : null;
-  drawRelabelBanner(["LOST", "STOPPED"].includes(state) ? null : again);
-  byId("cancel-target").hidden ||= view.mode === "review";
+  const again = (view.mode === "review" || past) && !["LOST", "STOPPED"].includes(state) ? target : null;
+  drawBanner(state, view, link.problem, again);
   drawTrial(trial, state);
   const usable = link.alive && !commands.pending;
   drawActions(page, state, target, usable, usable && !review.justCame());

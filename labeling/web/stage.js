@@ -1,6 +1,6 @@
 // Pictures and the embedded Rerun view, which lives on another site and may take the keyboard.
 
-import { byId } from "/draw.js";
+import { byId, text } from "/draw.js";
 
 const OVERLAY = "overlay"; // the picture of the pose that was found; any other shows how to place
 
@@ -33,7 +33,7 @@ export class Stage {
     byId("viewer").hidden = chosen !== "recording";
     if (chosen === "recording") this.point(this.loaded.recording.came);
     byId("stage-empty").hidden = Boolean(chosen);
-    byId("stage-empty").textContent = this.missing(view, candidates);
+    text("stage-empty", this.missing(view, candidates));
   }
 
   // Why the stage is empty.
