@@ -17,11 +17,9 @@ CLEARLY_WORSE = 0.15
 """A pose whose render cost is this far above the best one's needs no closer comparison."""
 REFUTED = 0.4
 """With this much evidence for another stable pose, the declared one is taken to be wrong."""
-ENOUGH = float(np.log(200.0))
-"""Log odds that rule a rival out: at most one wrong decision in two hundred."""
-KNOWN = 4.0
-"""Log odds against a pose at the end of a direction, beyond which less than half a percent of a
-normal distribution lies on both sides: 2.83 standard deviations off."""
+ENOUGH = float(np.log(100.0))
+"""Log odds that rule a rival out; along a direction that the fit leaves open, three standard
+deviations."""
 MOST_RIVALS = 5
 
 
@@ -156,7 +154,7 @@ def _open_ends(job: Job, chosen: Hypothesis) -> list[RatedRival]:
         if not poses:
             continue
         evidence = job.weigh(chosen, poses)
-        open_still = np.flatnonzero(evidence.log_odds < KNOWN)
+        open_still = np.flatnonzero(evidence.log_odds < ENOUGH)
         if len(open_still) == 0:
             continue
         last = int(open_still[-1])

@@ -15,7 +15,7 @@ from registration.rendering import Rendered, render
 
 FEW_PIXELS = 12
 """So many differing pixels of full disagreement make a margin of one half."""
-FACE_NOISE, EDGE_NOISE = 2.0, 24.0
+FACE_NOISE, EDGE_NOISE = 2.0, 16.0
 """Variance of a depth's error beyond the table's noise, in units of that noise's, for each pixel by
 itself: on faces, and where one of the poses is off by more than the tolerance, as beside edges,
 where depths of front and back mix. Measured: decision 0044."""

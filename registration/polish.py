@@ -24,11 +24,12 @@ POINTS = 1500
 STEPS = 4
 SHALLOW = 0.3
 """Depths of a face seen at less than this cosine are not taken to lie any deeper for it."""
-PRINT_ERROR = 3e-5
-"""Standard deviation of the part's shape against its mesh, as an offset of the whole pose [m]."""
+PRINT_ERROR = 1e-5
+"""Standard deviation of the part's shape against its mesh, averaged over the part: an offset of
+the whole pose [m]."""
 UNKNOWN_TURN, UNKNOWN_PLACE = np.pi / np.sqrt(3.0), 0.1
 """Standard deviations of a direction that nothing tells about [rad, m]: a turn that may be any."""
-RIM, RIM_ERROR = 0.25, 0.3
+RIM, RIM_ERROR = 0.25, 0.15
 """Points on faces seen at less than this cosine tell where the part's rim is; they share an error,
 in pixels: those that noise moved outward are taken for the face beyond the edge."""
 SLOPES = (0.4, 0.55, 0.7, 0.85)
@@ -82,14 +83,14 @@ def polish(
     points = seen.points[np.arange(count) * len(seen.points) // count]
     effective = _effective(count, len(seen.points), seen.table.correlation_area)
     scale = max(0.4e-3, 3 * noise)
-    rim_error = RIM_ERROR * float(points[:, 2].mean()) / seen.frame.intrinsics.fx
+    pixel = float(points[:, 2].mean()) / seen.frame.intrinsics.fx
     T = np.array(T_camera_object)
     for step in range(STEPS + 1):
         residual, jacobian, cosine = _in_depth(*_residuals(model, points, T), points, T)
         weight = (scale**2 / (scale**2 + residual**2)) ** 2
         sigma = _spread(residual, weight, cosine, noise)
         gain = weight / sigma**2 * (_efficiency(residual / sigma, weight) * effective / count)
-        gain *= _rim_share(gain, cosine, rim_error)
+        gain *= _rim_share(gain, cosine, RIM_ERROR * pixel / SHALLOW)
         information = told.T @ _weighted_gram(jacobian, gain) @ told
         gradient = (jacobian * (gain * residual)[:, None]).sum(axis=0)
         total = information + _vague(model.obj.com)
@@ -160,7 +161,7 @@ def _effective(count: int, total: int, correlation_area: float) -> float:
 
 
 def _rim_share(gain: FloatArray, cosine: FloatArray, rim_error: float) -> FloatArray:
-    """What is left of the information (N,) of points at the rim, as they share an error [m]."""
+    """What is left of the information (N,) of points at the rim, as they share a depth error [m]."""
     rim = cosine < RIM
     told = float(gain[rim].sum())
     return np.where(rim, 1.0 / (1.0 + told * rim_error**2), 1.0)
