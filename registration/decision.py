@@ -17,9 +17,9 @@ CLEARLY_WORSE = 0.15
 """A pose whose render cost is this far above the best one's needs no closer comparison."""
 REFUTED = 0.4
 """With this much evidence for another stable pose, the declared one is taken to be wrong."""
-ENOUGH = float(np.log(100.0))
-"""Log odds that rule a rival out; along a direction that the fit leaves open, three standard
-deviations."""
+ENOUGH = 4.0
+"""Log odds that rule a rival out. Along a direction that the fit leaves open, half a percent of a
+normal distribution lies further off on both sides."""
 MOST_RIVALS = 5
 
 
