@@ -46,7 +46,9 @@ def _compile(function: Function, **options: Any) -> Function:
     before = config.CACHE_DIR
     config.CACHE_DIR = _FOLDER
     try:
-        decorate = numba.njit(cache=True, nogil=True, error_model="numpy", **options)
+        decorate = numba.njit(
+            cache=True, nogil=True, error_model="numpy", no_cfunc_wrapper=True, **options
+        )
         result: Function = decorate(function)
     finally:
         config.CACHE_DIR = before

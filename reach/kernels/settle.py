@@ -24,18 +24,18 @@ from reach.kernels.settle_pads import list_all, press_all
 from reach.kernels.settle_press import pressed
 from reach.kernels.settle_push import LEVEL, MOST_PUSHES, gyration_about, push, spread_about
 from reach.kernels.settle_room import Candidates, Hand, Room, make_room
-from reach.kernels.settle_slide import GONE, MOST_STEPS, MOVING, margin_of, slide
+from reach.kernels.settle_slide import GONE, JAMMED, MOST_STEPS, MOVING, margin_of, slide
 from reach.kernels.support import friction_support
 from reach.kernels.tree import MeshTree
 from reach.kernels.verdict import to_wrench_frame
 
-HELD, NO_CONTACT, SQUEEZED_OUT, MOVING_ON, SLIPPED = 0, 1, 2, 3, 4
-"""How a grasp ends: held; a pad never met the part; the part moved off a pad while it settled; it
-was still moving when the steps ran out; it slipped, or turned away, when lifted."""
+HELD, NO_CONTACT, SQUEEZED_OUT, MOVING_ON, SLIPPED, STUCK = 0, 1, 2, 3, 4, 5
+"""How a grasp ends: held, in balance; a pad never met the part; the part moved off a pad while it
+settled; it was still moving when the steps ran out; it slipped, or turned away, when lifted; it
+is stuck between the pads: out of balance, and yet no motion releases energy."""
 
 FEATURES = 8
-"""Columns (and one more a jaw) of what is known of a grasp besides its fate: 0 residual when settled
-[N], 1 and 2 translation [m] and rotation [rad] of the part until then, 3 preload over the most that
+"""Columns (and one more a jaw) of what is known of a grasp besides its fate: 0 residual in the end [N], 1 and 2 translation [m] and rotation [rad] of the part until then, 3 preload over the most that
 friction could oppose to it, 4 area of the lesser jaw's patch at the pad's deformable depth [m^2],
 5 least distance of a center of pressure from the pad's outline [m], 6 motion in the lift [m],
 7 translation while one jaw alone pushed [m], 8 and on depth that each pad is pressed in [m]."""
@@ -117,9 +117,11 @@ def judge_one(
     T0, com = T_object_gripper, hand.com
     row[:] = 0.0
     _, weight = to_wrench_frame(T0, com, gravity_object)
-    heavy = np.sqrt(weight[0] ** 2 + weight[1] ** 2 + weight[2] ** 2)
+    heavy, up = np.sqrt(weight[0] ** 2 + weight[1] ** 2 + weight[2] ** 2), np.empty(3)
+    for i in range(3):
+        up[i] = -gravity_object[i] / heavy
 
-    T, step, on_table = close(mesh, pads, T0, -gravity_object / heavy, hand, ways, room, path)
+    T, step, on_table = close(mesh, pads, T0, up, hand, ways, room, path)
     row[7], _ = motion_between(T0, T, com)
     closed = step
 
@@ -139,15 +141,16 @@ def judge_one(
     describe(pads, found, room, row)
     areas[:] = room.areas
 
-    T, end, lost, points, _, lengths[1] = slide(
+    T, end, lost, points, row[0], lengths[1] = slide(
         mesh, pads, T_rest, weight, hand, ways.in_air, ways.seen_in_air, room, path, step
     )
     travel, turn = motion_between(T_rest, T, com)
     row[6] = travel + hand.length * turn
     if end == GONE or end == MOVING:
         return 0.0, SLIPPED, lost
-    # Where no motion gains energy the part hangs, whatever the rest of the residual says.
-    return max(1.0, margin_of(weight, ways.seen_in_air, points, hand, cap, room)), HELD, 0
+    if end == JAMMED:  # it hangs, but how much more than its weight would hang is not known
+        return 1.0, STUCK, 0
+    return margin_of(weight, ways.seen_in_air, points, hand, cap, room), HELD, 0
 
 
 @compiled
@@ -188,6 +191,12 @@ def opposed(seen: FloatArray, points: int, room: Room) -> float:
         d[i] /= size
     most = friction_support(room.points, 0, points, d, new)
     return size / max(most, 1e-9)
+
+
+@compiled
+def same(a: FloatArray, b: FloatArray) -> bool:
+    """Whether two points are equal."""
+    return bool(a[0] == b[0] and a[1] == b[1] and a[2] == b[2])
 
 
 @compiled
@@ -236,7 +245,7 @@ def judge_settling(
     room = make_room(len(pads.edges))
     ways = ways_of(mesh, pads, com_object[0])
     for n in range(len(margins)):
-        if n > 0 and np.any(com_object[n] != com_object[n - 1]):
+        if n > 0 and not same(com_object[n], com_object[n - 1]):
             ways = ways_of(mesh, pads, com_object[n])
         hand = Hand(com_object[n], force[n], friction[n], stiffness, length)
         margins[n], fates[n], missing[n] = judge_one(

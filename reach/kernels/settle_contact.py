@@ -7,6 +7,8 @@ a settling part asks for these dozens of times.
 
 from __future__ import annotations
 
+from typing import cast
+
 import numpy as np
 
 from reach.arrays import FloatArray, IntArray
@@ -19,6 +21,9 @@ CELLS = 4
 GROUPS = CELLS * CELLS * CLASSES
 SUMS = 10
 """Columns: integral of p 0, of p r 1-3, of p n n' (xx, yy, zz, xy, xz, yz) 4-9."""
+START: int = cast(int, np.int64(0))
+CORNERS: int = cast(int, np.int64(3))
+"""Numbers that are no literals: numba compiles a function anew for a literal number."""
 SMALL = 0.5
 """Triangles smaller than this share of a cell go uncut to the cell of their barycenter."""
 
@@ -72,6 +77,13 @@ def _add(
         wrench[5] += mx * ny - my * nx
         total += area
     return total
+
+
+@compiled
+def _copy(corners: FloatArray, count: int, target: FloatArray) -> None:
+    for k in range(count):
+        for i in range(3):
+            target[k, i] = corners[k, i]
 
 
 @compiled
@@ -133,9 +145,9 @@ def add_layer(
         most = max(triangles[t, 0, 2], triangles[t, 1, 2], triangles[t, 2, 2])
         if least >= high:
             continue
-        whole[:3] = triangles[t]
+        _copy(triangles[t], 3, whole)
         if most > high:
-            corners = cut(whole, 3, 0.0, 0.0, 1.0, high, spare)
+            corners = cut(whole, CORNERS, 0.0, 0.0, 1.0, high, spare)
             if corners == 0:
                 continue
         n = normals[t]
@@ -153,14 +165,14 @@ def add_layer(
             iy0, iy1 = _cell(y0, low_y, size_y), _cell(y1, low_y, size_y)
         for ix in range(ix0, ix1 + 1):
             inside = corners
-            strip[:corners] = whole[:corners]
+            _copy(whole, corners, strip)
             if ix > ix0:
                 inside = cut(strip, inside, -1.0, 0.0, 0.0, -(low_x + ix * size_x), spare)
             if ix < ix1:
                 inside = cut(strip, inside, 1.0, 0.0, 0.0, low_x + (ix + 1) * size_x, spare)
             for iy in range(iy0, iy1 + 1):
                 left = inside
-                cell[:left] = strip[:left]
+                _copy(strip, left, cell)
                 if iy > iy0:
                     left = cut(cell, left, 0.0, -1.0, 0.0, -(low_y + iy * size_y), spare)
                 if iy < iy1:

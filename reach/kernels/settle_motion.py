@@ -27,18 +27,26 @@ def closing_axis(T_gripper_pad: FloatArray) -> tuple[FloatArray, bool]:
 
 
 @compiled
-def _unit(v: FloatArray) -> FloatArray:
-    unit: FloatArray = v / np.sqrt(v[0] * v[0] + v[1] * v[1] + v[2] * v[2])
-    return unit
+def _cross_into(a: FloatArray, b: FloatArray, row: FloatArray) -> float:
+    """Write a x b to the first three numbers of a row of zeros; returns its length."""
+    squares = 0.0
+    for i in range(3):
+        j, k = (i + 1) % 3, (i + 2) % 3
+        row[i] = a[j] * b[k] - a[k] * b[j]
+        squares += row[i] * row[i]
+    return float(np.sqrt(squares))
 
 
 @compiled
-def _cross(a: FloatArray, b: FloatArray) -> FloatArray:
-    c = np.empty(3)
-    c[0] = a[1] * b[2] - a[2] * b[1]
-    c[1] = a[2] * b[0] - a[0] * b[2]
-    c[2] = a[0] * b[1] - a[1] * b[0]
-    return c
+def _unit_across(a: FloatArray, b: FloatArray, row: FloatArray) -> None:
+    """Write the direction of a x b, or any across a if they are parallel."""
+    size = _cross_into(a, b, row)
+    if size < 1e-3:
+        other = np.zeros(3)
+        other[0 if abs(a[0]) < 0.9 else 1] = 1.0
+        size = _cross_into(a, other, row)
+    for i in range(3):
+        row[i] /= size
 
 
 @compiled
@@ -49,28 +57,22 @@ def motions_on_table(up: FloatArray, axis: FloatArray) -> FloatArray:
         up: normal of the table, gripper frame, shape (3,).
         axis: closing axis, gripper frame, shape (3,).
     """
-    across = _cross(up, axis)
-    if across[0] ** 2 + across[1] ** 2 + across[2] ** 2 < 1e-6:  # closing straight down
-        other = np.zeros(3)
-        other[0 if abs(up[0]) < 0.9 else 1] = 1.0
-        across = _cross(up, other)
-    across = _unit(across)
     motions = np.zeros((3, 6))
-    motions[0, :3] = across
-    motions[1, :3] = _cross(across, up)
-    motions[2, 3:] = up
+    _unit_across(up, axis, motions[0])  # any, if the jaws close straight down
+    _cross_into(motions[0], up, motions[1])
+    for i in range(3):
+        motions[2, 3 + i] = up[i]
     return motions
 
 
 @compiled
 def motions_in_air(axis: FloatArray) -> FloatArray:
     """Orthonormal twists of a part that hangs between the jaws, shape (6, 6)."""
-    other = np.zeros(3)
-    other[0 if abs(axis[0]) < 0.9 else 1] = 1.0
-    first = _unit(_cross(axis, other))
     motions = np.zeros((6, 6))
-    motions[0, :3], motions[1, :3], motions[2, :3] = first, _cross(axis, first), axis
+    _unit_across(axis, axis, motions[0])
+    _cross_into(axis, motions[0], motions[1])
     for i in range(3):
+        motions[2, i] = axis[i]
         motions[3 + i, 3 + i] = 1.0
     return motions
 
@@ -91,19 +93,25 @@ def without_axis(motions: FloatArray, axis: FloatArray, common: bool) -> FloatAr
 
 @compiled
 def moved(
-    T_object_gripper: FloatArray, com_object: FloatArray, twist: FloatArray, length: float
+    T_object_gripper: FloatArray,
+    com_object: FloatArray,
+    twist: FloatArray,
+    way: float,
+    length: float,
 ) -> FloatArray:
     """Pose of the gripper in the part after the part has moved.
 
     Args:
         T_object_gripper: before, shape (4, 4).
         com_object: shape (3,) [m].
-        twist: translation of the center of mass [m] and rotation about it times `length` [m],
-            gripper axes, shape (6,).
+        twist: translation of the center of mass and rotation about it times `length`, gripper
+            axes, shape (6,).
+        way: how far along the twist [m].
         length: torque scale [m].
     """
     T = T_object_gripper
-    wx, wy, wz = twist[3] / length, twist[4] / length, twist[5] / length
+    turn = way / length
+    wx, wy, wz = turn * twist[3], turn * twist[4], turn * twist[5]
     angle = np.sqrt(wx * wx + wy * wy + wz * wz)
     s = np.sin(angle) / angle if angle > 1e-12 else 1.0
     c = (1.0 - np.cos(angle)) / (angle * angle) if angle > 1e-6 else 0.5
@@ -122,7 +130,7 @@ def moved(
     result[3, 3] = 1.0
     com = np.empty(3)
     for i in range(3):
-        com[i] = twist[i]
+        com[i] = way * twist[i]
         for j in range(3):
             com[i] += T[j, i] * (com_object[j] - T[j, 3])
             result[i, j] = T[i, 0] * R[0, j] + T[i, 1] * R[1, j] + T[i, 2] * R[2, j]

@@ -10,7 +10,7 @@ from reach.kernels.elements import wrench_in_frame
 from reach.kernels.pads import Pads
 from reach.kernels.patch import contact_depth
 from reach.kernels.prism import NEVER, most_pieces
-from reach.kernels.settle_contact import add_layer, friction_points_of
+from reach.kernels.settle_contact import START, add_layer, friction_points_of
 from reach.kernels.settle_press import (
     BACKING,
     DEEPEST,
@@ -120,7 +120,7 @@ def preload_of(
     depth, limit = room.depths[jaw], pads.max_deformation[jaw]
     rows, room.areas[jaw] = add_layer(
         room.counts[jaw], one.triangles, one.normals, depth, stiffness,
-        room.sums, room.used, 0, pushed,
+        room.sums, room.used, START, pushed,
     )  # fmt: skip
     if depth > room.firsts[jaw] - SLACK + limit:
         rows, _ = add_layer(
@@ -128,18 +128,21 @@ def preload_of(
             BACKING * stiffness, room.sums, room.used, rows, pushed,
         )  # fmt: skip
     total = 0.0
-    room.centers[jaw] = 0.0
+    for i in range(3):
+        room.centers[jaw, i] = 0.0
     for row in range(rows):
         m = room.sums[room.used[row]]
         total += m[0]
         for i in range(3):
             room.centers[jaw, i] += m[1 + i]
     if total > 0.0:
-        room.centers[jaw] /= total
+        for i in range(3):
+            room.centers[jaw, i] /= total
     wrench_in_frame(
         pushed[0], pushed[1], pushed[2], pushed[3], pushed[4], pushed[5], T, hand.length, wrench
     )
-    room.wrench[:] += wrench
+    for i in range(6):
+        room.wrench[i] += wrench[i]
     return friction_points_of(
         rows, room.used, room.sums, hand.friction, T, hand.length, room.points, column
     )
@@ -150,7 +153,7 @@ def preload(
     pads: Pads, T_frame_gripper: FloatArray, hand: Hand, found: list[Candidates], room: Room
 ) -> int:
     """Write preload wrench and friction points of all jaws; returns the number of points."""
-    column = 0
+    column = START
     room.wrench[:] = 0.0
     for jaw in range(len(pads.edges)):
         column = preload_of(pads, jaw, T_frame_gripper, hand, found[jaw], room, column)

@@ -19,6 +19,7 @@ import numpy as np
 from reach.arrays import FloatArray
 from reach.kernels.compiling import compiled
 from reach.kernels.pads import Pads
+from reach.kernels.settle_contact import START
 from reach.kernels.settle_motion import moved
 from reach.kernels.settle_pads import list_all, preload_of, press_all
 from reach.kernels.settle_room import SLACK, Hand, Room
@@ -84,7 +85,7 @@ def push(
             break
         T_frame, _ = to_wrench_frame(T, hand.com, np.zeros(3))
         room.wrench[:] = 0.0
-        preload_of(pads, first, T_frame, light, found[first], room, 0)
+        preload_of(pads, first, T_frame, light, found[first], room, START)
         T_pad = compose(T_frame, pads.T_gripper_pad[first])
         pushed_twist(motions, room.wrench, room.centers[first], T_pad, hand, gyration, q, gain)
         gain = gain * CALMER if q[2] * last < 0.0 else min(1.0, gain * LIVELIER)
@@ -95,12 +96,12 @@ def push(
         length = min(left, LONGEST_PUSH / size)
         twist = np.zeros(6)
         for i in range(6):
-            twist[i] = length * (q[0] * motions[0, i] + q[1] * motions[1, i])
-            twist[i] += length * q[2] * hand.length / gyration * motions[2, i]
+            twist[i] = q[0] * motions[0, i] + q[1] * motions[1, i]
+            twist[i] += q[2] * hand.length / gyration * motions[2, i]
         used += 2.0 * length * size
         if used > SLACK:
             found, used = list_all(mesh, pads, T, room), 2.0 * length * size
-        T = moved(T, hand.com, twist, hand.length)
+        T = moved(T, hand.com, twist, length, hand.length)
         if step < len(path):
             path[step] = T
         step += 1
@@ -183,9 +184,11 @@ def pushed_twist(
 @compiled
 def spread_about(mesh: MeshTree, com: FloatArray) -> FloatArray:
     """Second moments of the surface about a point, per area, shape (3, 3) [m^2]."""
-    result, total = np.zeros((3, 3)), 0.0
+    result, total, c = np.zeros((3, 3)), 0.0, np.empty((3, 3))
     for t in range(len(mesh.corners)):
-        c = mesh.corners[t] - com
+        for k in range(3):
+            for i in range(3):
+                c[k, i] = mesh.corners[t, k, i] - com[i]
         ux, uy, uz = c[1, 0] - c[0, 0], c[1, 1] - c[0, 1], c[1, 2] - c[0, 2]
         vx, vy, vz = c[2, 0] - c[0, 0], c[2, 1] - c[0, 1], c[2, 2] - c[0, 2]
         x, y, z = uy * vz - uz * vy, uz * vx - ux * vz, ux * vy - uy * vx
@@ -197,7 +200,10 @@ def spread_about(mesh: MeshTree, com: FloatArray) -> FloatArray:
                 for k in range(3):
                     value += c[k, i] * c[k, j]
                 result[i, j] += area * value / 12.0
-    return result / total
+    for i in range(3):
+        for j in range(3):
+            result[i, j] /= total
+    return result
 
 
 @compiled

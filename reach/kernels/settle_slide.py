@@ -129,12 +129,13 @@ def slide(
     T = T_object_gripper
     T_frame, _ = to_wrench_frame(T, hand.com, weight)
     reach = max(1.0, reach_of(pads, T_frame) / hand.length)
+    most = min(LONGEST_STEP, 0.5 * SLACK / reach)
     found = list_all(mesh, pads, T, room)
     potential, lost = press_all(mesh, pads, T, hand, found, room)
     if lost:
         return T, GONE, lost, 0, 0.0, step
     y, twist = np.zeros(len(motions)), np.empty(6)
-    used, longest, points, left = 0.0, LONGEST_STEP, 0, 0.0
+    used, longest, points, left = 0.0, most, 0, 0.0
     for _ in range(MOST_STEPS):
         T_frame, _ = to_wrench_frame(T, hand.com, weight)
         points = preload(pads, T_frame, hand, found, room)
@@ -146,7 +147,7 @@ def slide(
         while length >= SHORTEST_STEP:
             if used + length * reach > SLACK:
                 found, used = list_all(mesh, pads, T, room), 0.0
-            after = moved(T, hand.com, length * twist, hand.length)
+            after = moved(T, hand.com, twist, length, hand.length)
             value, lost = press_all(mesh, pads, after, hand, found, room)
             if lost and used > 0.0:  # the candidates may have run out, not the part
                 found, used = list_all(mesh, pads, after, room), 0.0
@@ -158,7 +159,7 @@ def slide(
             press_all(mesh, pads, T, hand, found, room)
             return T, JAMMED, 0, points, left, step
         T, potential, used = after, value, used + length * reach
-        longest = min(LONGEST_STEP, 2.0 * length)
+        longest = min(most, 2.0 * length)
         if step < len(path):
             path[step] = T
         step += 1
@@ -171,16 +172,15 @@ def slide(
 def margin_of(
     weight: FloatArray, seen: FloatArray, points: int, hand: Hand, cap: float, room: Room
 ) -> float:
-    """How many times the weight the settled contacts carry, up to a cap."""
+    """How many times the weight contacts in balance carry, from once up to a cap."""
     y = np.zeros(len(seen))
     if in_balance(weight, cap, seen, points, hand, room, y)[0]:
-        return cap
-    holds = in_balance(weight, 1.0, seen, points, hand, room, y)[0]
-    low, high = (1.0, cap) if holds else (0.0, 1.0)
+        return max(cap, 1.0)
+    low, high = 1.0, cap
     for _ in range(6):
         middle = 0.5 * (low + high)
         if in_balance(weight, middle, seen, points, hand, room, y)[0]:
             low = middle
         else:
             high = middle
-    return low if holds else min(low, 0.999)
+    return max(low, 1.0)

@@ -88,7 +88,7 @@ class SettledContact(CompiledModel):
     stiffness: float = FOUNDATION_STIFFNESS
     margin_cap: float = MARGIN_CAP
     name: ClassVar[str] = "settled"
-    version: ClassVar[str] = "3"
+    version: ClassVar[str] = "4"
 
     def __post_init__(self) -> None:
         positive(self.friction, "friction", zero_allowed=True)
@@ -188,7 +188,7 @@ class SettledContact(CompiledModel):
 
 def _settlement(scene: Scene, grasp: Grasp, told: Settled) -> Settlement:
     T_world_gripper = scene.T_world_object @ grasp.T_object_gripper
-    _, translation, yaw, preload, area, inside, lift, pushed = told.features[0, :FEATURES]
+    residual, translation, yaw, preload, area, inside, lift, pushed = told.features[0, :FEATURES]
     return Settlement(
         FATES[int(told.fate[0])],
         float(translation),
@@ -200,6 +200,7 @@ def _settlement(scene: Scene, grasp: Grasp, told: Settled) -> Settlement:
         float(inside),
         float(lift),
         float(pushed),
+        float(residual),
     )
 
 

@@ -109,12 +109,12 @@ def _details(verdict: SettledVerdict) -> dict[str, Any]:
 
 @dataclass(frozen=True, slots=True)
 class SettledRobustScorer(_ManyScores):
-    """Scores the chance of holding under perturbed pose, friction and mass.
+    """Scores the success rate under perturbed pose, friction and mass.
 
     Args:
         model: judges each sample.
         default_pose_error: used where a scene's own is not known.
-        grade: turns what is known of all samples into a chance; None takes the share that holds.
+        grade: turns what is known of all samples into a rate; None takes the share that holds.
         samples: settled grasps a score.
         friction_spread: relative standard deviation.
         mass_spread: relative standard deviation.
@@ -159,7 +159,7 @@ class SettledRobustScorer(_ManyScores):
         told = self.settled_samples(scene, grasp, error, seed)
         held = told.margin >= 1.0
         share = float(held.mean())
-        value = share if self.grade is None else self.grade.chance(scene.gripper, told)
+        value = share if self.grade is None else self.grade.rate(scene.gripper, told)
         low, high = wilson_interval(int(held.sum()), len(held))
         counts = Counter(str(FATES[code]) for code in told.fate)
         details: dict[str, Any] = {

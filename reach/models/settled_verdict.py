@@ -19,10 +19,18 @@ class Fate(StrEnum):
     SQUEEZED_OUT = "squeezed out"
     STILL_SLIDING = "still sliding"
     SLIPPED_ON_LIFT = "slipped on lift"
+    JAMMED = "jammed"
 
 
 FATES = tuple(Fate)
-REASON_OF = (Reason.HOLDS, Reason.NO_CONTACT, Reason.SLIPS, Reason.SLIPS, Reason.SLIPS)
+REASON_OF = (
+    Reason.HOLDS,
+    Reason.NO_CONTACT,
+    Reason.SLIPS,
+    Reason.SLIPS,
+    Reason.SLIPS,
+    Reason.HOLDS,
+)
 """Reason of each fate."""
 PUSHED = 1e-4
 """A push is told from here on [m]."""
@@ -44,6 +52,7 @@ class Settlement:
         inside: distance of the pressures' centers from the pads' outline, the lesser [m].
         lift_motion: of the part in the hand while it was lifted [m].
         pushed: the translation until the second jaw touched [m].
+        residual: what friction could not balance in the end [N], torques over the torque scale.
     """
 
     fate: Fate
@@ -56,6 +65,7 @@ class Settlement:
     inside: float
     lift_motion: float
     pushed: float
+    residual: float
 
     @property
     def T_world_object(self) -> FloatArray:
@@ -108,4 +118,9 @@ class SettledVerdict(Verdict):
             if self.missing_jaws:
                 return f"{stood}, slips on the lift: lost after {told.lift_motion * 1e3:.1f} mm"
             return f"{stood}, still slips after {told.lift_motion * 1e3:.1f} mm of the lift"
+        if told.fate is Fate.JAMMED:
+            return (
+                f"{stood}, hangs jammed: {told.residual:.2g} N more than friction can balance, "
+                "but no motion would release energy"
+            )
         return f"{stood}, holds {self.margin:.3g} times gravity"

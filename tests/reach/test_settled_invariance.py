@@ -13,7 +13,7 @@ from reach.gripper import Jaw
 from reach.kernels.settle_press import press, pressed
 from reach.models.registry import make_scorer
 from reach.models.settled import Settled
-from reach.models.settled_grade import GRADE
+from reach.models.settled_grade import GRADE, Grade
 from reach.models.settled_score import SettledRobustScorer, SettledScorer
 from reach.models.settled_verdict import Fate
 
@@ -180,11 +180,33 @@ def told(held, inside):
 
 
 def test_the_grade_rises_with_the_share_that_holds_and_with_the_distance_from_the_rim():
-    share = [GRADE.chance(YUMI, told(np.arange(100) < k, 0.003)) for k in range(0, 101, 5)]
+    share = [GRADE.rate(YUMI, told(np.arange(100) < k, 0.003)) for k in range(0, 101, 5)]
     assert np.all(np.diff(share) >= 0) and np.all(np.diff(share[:18]) > 0)
     assert share[0] < 0.05 and share[-1] == 1.0
-    rim = [GRADE.chance(YUMI, told(np.arange(100) < 60, d)) for d in np.linspace(-1e-3, 5e-3, 20)]
+    rim = [GRADE.rate(YUMI, told(np.arange(100) < 60, d)) for d in np.linspace(-1e-3, 5e-3, 20)]
     assert np.all(np.diff(rim) >= 0) and rim[-1] > rim[0] + 0.2
+
+
+@pytest.mark.parametrize("samples", [20, 100])
+@pytest.mark.parametrize("share", [0.0, 0.35, 0.8, 0.95])
+def test_the_grade_is_the_median_of_alike_grasps_told_in_whole_samples(share, samples):
+    """Against Beta-distributed rates drawn at random."""
+    grade = Grade(offset=-0.5, share=0.8, inside=3.0, alike=6.0)
+    held = round(share * samples)
+    value = grade.rate(YUMI, told(np.arange(samples) < held, 0.002))
+    assert round(value * samples) == pytest.approx(value * samples)
+    odds = (held + 0.5) / (samples - held + 0.5)
+    inside = 0.002 / (0.5 * YUMI.jaws[0].pad.width) if held else 0.0
+    mean = 1.0 / (1.0 + np.exp(0.5 - 3.0 * inside) * odds**-0.8)
+    rates = np.random.default_rng(1).beta(6.0 * mean, 6.0 * (1.0 - mean), 40000)
+    assert value == pytest.approx(np.median(rates), abs=0.5 / samples + 0.006)
+
+
+def test_the_less_grasps_are_alike_the_nearer_is_the_score_to_yes_or_no():
+    most = told(np.arange(100) < 90, 0.003)
+    values = [Grade(0.0, 1.0, 0.0, alike).rate(YUMI, most) for alike in (1000.0, 5.0, 0.5)]
+    assert values[0] == pytest.approx(0.9, abs=0.011)
+    assert values[0] < values[1] < values[2] == 1.0
 
 
 @pytest.mark.parametrize(

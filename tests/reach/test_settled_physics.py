@@ -129,6 +129,12 @@ def test_a_cylinder_does_not_care_where_between_the_pads_it_stands(offset):
     assert verdict.settlement.preload_share < 0.1
 
 
+def test_nor_does_a_frictionless_one_while_the_pads_cover_its_patch():
+    inside = judged(cylinder(), from_above(y=0.004), friction=0.0)
+    assert inside.settlement.translation < 2e-4 and inside.settlement.yaw < 1e-3
+    assert inside.settlement.fate is Fate.SLIPPED_ON_LIFT  # nothing carries its weight
+
+
 @pytest.mark.parametrize("offset", [-0.0115, 0.0115])
 def test_a_frictionless_cylinder_is_expelled_once_the_rim_cuts_its_patch(offset):
     verdict = judged(cylinder(), from_above(y=offset), friction=0.0)
@@ -208,6 +214,19 @@ def test_the_lift_adds_the_weight():
     assert "slips on the lift" in heavy.explanation
     carried = judged(cube(mass=1.0), from_above())
     assert carried.margin == pytest.approx(2 * 0.4 * FORCE / 9.81, rel=0.15)
+
+
+def test_a_jammed_part_hangs_but_is_not_said_to_carry_so_much_more():
+    """A steep wedge caught by its corner: out of balance, and yet stuck."""
+    verdict = judged(
+        wedge(np.radians(6)), from_above(np.radians(45), y=0.014, z=0.012), friction=0.8
+    )
+    assert verdict.settlement.fate is Fate.JAMMED
+    assert verdict.resists and verdict.margin == 1.0 and verdict.reason is Reason.HOLDS
+    assert verdict.settlement.residual > 0.03
+    assert "jammed" in verdict.explanation and "times gravity" not in verdict.explanation
+    held = judged(wedge(np.radians(6)), from_above(), friction=0.8)
+    assert held.settlement.fate is Fate.HELD and held.margin > 1.0
 
 
 def test_jaws_that_meet_nothing_say_so():
