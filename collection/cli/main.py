@@ -10,6 +10,7 @@ from typing import Annotated
 
 import typer
 
+from collection.cli.leaving import QuickExit
 from reach.errors import ReachError
 
 COMMANDS: dict[str, str] = {
@@ -154,4 +155,6 @@ def _complain(message: str, code: int) -> int:
 
 def run() -> None:
     """Entry point of the command `reach`."""
-    sys.exit(main())
+    leaving = QuickExit()
+    leaving.code = main()
+    sys.exit(leaving.code)
