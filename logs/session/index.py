@@ -35,23 +35,35 @@ Known = Mapping[tuple[str, int, int], dict[str, Any]]
 def list_takes(path: Path) -> list[IndexRow]:
     """All takes of a session in the order of trials; brings the index up to date first.
 
+    A session that may only be read is listed from journal and records alone.
+
     Raises:
         NotASessionError: if the folder is no session.
         JournalDamagedError: if the journal needs `reach recover`.
     """
     folder = SessionFolder.open(path)
-    with closing(table.open_index(folder.path)) as database:
-        about = table.read_about(database)
-        sources = _sources(folder)
-        if any(about.get(name) != value for name, value in sources.items()):
-            _update(database, folder, about, sources)
-        return list(table.read_rows(database))
+    with table.alone(folder.path):
+        try:
+            with closing(table.open_index(folder.path)) as database:
+                return _listed(database, folder)
+        except (sqlite3.OperationalError, OSError):
+            pass  # a folder that may only be read, a full disk: the index is only a cache
+    with closing(table.passing_index()) as database:
+        return _listed(database, folder)
 
 
 def rebuild_index(folder: SessionFolder) -> None:
     """Build the index from nothing but journal and records."""
-    with closing(table.open_index(folder.path)) as database:
+    with table.alone(folder.path), closing(table.open_index(folder.path)) as database:
         _fill(database, folder, _sources(folder), known={})
+
+
+def _listed(database: sqlite3.Connection, folder: SessionFolder) -> list[IndexRow]:
+    about = table.read_about(database)
+    sources = _sources(folder)
+    if any(about.get(name) != value for name, value in sources.items()):
+        _update(database, folder, about, sources)
+    return list(table.read_rows(database))
 
 
 def _sources(folder: SessionFolder) -> dict[str, Any]:

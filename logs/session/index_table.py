@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import fcntl
 import json
+import os
 import sqlite3
 from collections.abc import Collection, Iterable, Iterator, Mapping
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -89,15 +92,42 @@ class IndexRow:
     scores: Mapping[str, float]
 
 
+@contextmanager
+def alone(session: Path) -> Iterator[None]:
+    """Wait until no other process makes or updates the session's index, and keep them waiting.
+
+    The folder itself is locked, which needs no right to write; where the file system knows no
+    locks, nothing is waited for.
+    """
+    descriptor = os.open(session, os.O_RDONLY | os.O_DIRECTORY | os.O_CLOEXEC)
+    try:
+        with suppress(OSError):
+            fcntl.flock(descriptor, fcntl.LOCK_EX)
+        yield
+    finally:
+        os.close(descriptor)
+
+
 def open_index(session: Path) -> sqlite3.Connection:
-    """Open a session's index; one that is damaged or of another version begins anew."""
+    """Open a session's index; one that is damaged or of another version begins anew.
+
+    To be called [alone][logs.session.index_table.alone].
+
+    Raises:
+        sqlite3.OperationalError: the folder or its disk takes no index.
+        OSError: likewise.
+    """
     path = session / INDEX_NAME
     database = sqlite3.connect(path)
     try:
         version = database.execute("PRAGMA user_version").fetchone()[0]
-        if version == INDEX_VERSION:
+        tables = {name for (name,) in database.execute("SELECT name FROM sqlite_master")}
+        if version == INDEX_VERSION and tables >= {"about", "takes", "scores"}:
             database.execute("SELECT count(*) FROM takes").fetchone()
             return database
+    except sqlite3.OperationalError:
+        database.close()
+        raise
     except sqlite3.DatabaseError:
         pass
     database.close()
@@ -105,6 +135,15 @@ def open_index(session: Path) -> sqlite3.Connection:
         leftover.unlink(missing_ok=True)
     database = sqlite3.connect(path)
     database.execute("PRAGMA journal_mode = WAL")
+    return _with_tables(database)
+
+
+def passing_index() -> sqlite3.Connection:
+    """An empty index in memory, for a folder that takes none."""
+    return _with_tables(sqlite3.connect(":memory:"))
+
+
+def _with_tables(database: sqlite3.Connection) -> sqlite3.Connection:
     database.executescript(f"{_SCHEMA} PRAGMA user_version = {INDEX_VERSION};")
     return database
 

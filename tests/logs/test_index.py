@@ -5,6 +5,7 @@ import random
 import shutil
 import sqlite3
 from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import closing
 from pathlib import Path
 
@@ -173,6 +174,25 @@ def test_a_damaged_index_is_rebuilt(session: SessionFolder, content: bytes) -> N
         path.unlink()
     (session.path / INDEX_NAME).write_bytes(content)
     assert list_takes(session.path) == expected
+
+
+def test_lists_asked_for_at_once_are_the_same_list(session: SessionFolder) -> None:
+    expected = list_takes(session.path)
+    for _ in range(5):
+        for path in session.path.glob(f"{INDEX_NAME}*"):
+            path.unlink()
+        with ThreadPoolExecutor(8) as pool:
+            for listed in pool.map(list_takes, [session.path] * 16):
+                assert listed == expected
+
+
+def test_a_folder_that_takes_no_index_is_listed_all_the_same(session: SessionFolder) -> None:
+    expected = list_takes(session.path)
+    for path in session.path.glob(f"{INDEX_NAME}*"):
+        path.unlink()
+    (session.path / INDEX_NAME).mkdir()  # like a folder that may only be read, also for root
+    assert list_takes(session.path) == expected
+    assert list((session.path / INDEX_NAME).iterdir()) == []
 
 
 def test_missing_damaged_and_unfinished_records_are_rows_too(session: SessionFolder) -> None:
