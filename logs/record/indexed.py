@@ -71,6 +71,8 @@ def indexed_messages(stream: BinaryIO, wanted: Collection[str]) -> list[RawMessa
 def _summary(stream: BinaryIO) -> bytes:
     """The summary section, its checksum verified."""
     end = stream.seek(0, io.SEEK_END) - len(_MAGIC) - _FOOTER.size
+    if end < 0:
+        raise RecordReadError("the record was not finished")
     stream.seek(end)
     closing = stream.read()
     opcode, _, start, offsets, checksum = _FOOTER.unpack_from(closing)
