@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any
 
-from logs.report.numbers import number, signed, span
+from logs.numbers import counted, number, signed, span
 
 if TYPE_CHECKING:
     from rich.table import Table
@@ -22,8 +22,8 @@ def evaluation_table(content: Mapping[str, Any]) -> list[Table]:
 
     marked = " - simulated labels" if content["simulated"] else ""
     title = (
-        f"{content['trials']} trials of {content['grasps']} grasps on "
-        f"{len(content['objects'])} objects{marked}"
+        f"{counted(content['trials'], 'trial')} of {counted(content['grasps'], 'grasp')} on "
+        f"{counted(len(content['objects']), 'object')}{marked}"
     )
     table = Table(title=title, title_justify="left", caption=_caption(content), box=SIMPLE_HEAD)
     for header in HEADERS:
@@ -61,7 +61,9 @@ def _gains_table(found: Sequence[Mapping[str, Any]]) -> Table:
             span(gain["ar_interval"], with_sign=True) or "–",
             signed(gain["ap"]),
             span(gain["ap_interval"], with_sign=True) or "–",
-            {True: "yes", False: "no", None: "–"}[gain["as_published"]],
+            {True: "yes" if gain["certain"] else "yes?", False: "no", None: "–"}[
+                gain["as_published"]
+            ],
         ]
         table.add_row(gain["model"], gain["rival"], *cells)
     return table

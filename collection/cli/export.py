@@ -38,6 +38,7 @@ def export(
     from collection.targets import check_new_folder
     from logs.dataset.files import FORMATS, check_formats, write_dataset
     from logs.dataset.sources import load_labeled
+    from logs.numbers import counted
 
     wanted = list(FORMATS) if formats == "all" else _split(formats)
     check_formats(wanted)
@@ -52,7 +53,8 @@ def export(
         )
         return
     marked = " (simulated)" if manifest.simulated else ""
-    print(f"{manifest.trials} trials{marked} of {len(manifest.objects)} objects -> {to}")
+    trials, objects = counted(manifest.trials, "trial"), counted(len(manifest.objects), "object")
+    print(f"{trials}{marked} of {objects} -> {to}")
     for reason, count in sorted(Counter(row.reason for row in dataset.left_out).items()):
         print(f"  left out: {count} {reason}")
     print(f"  {to / 'README.md'} is the data card")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
@@ -44,6 +44,7 @@ def import_(
     from collection.targets import check_new_folder
     from logs.dataset.files import write_dataset
     from logs.dataset.from_reach2019 import MassRule, import_reach2019, read_masses
+    from logs.numbers import counted
     from reach.arrays import positive
     from reach.errors import InvalidInputError, UnknownNameError
 
@@ -57,7 +58,7 @@ def import_(
     ignore = [masses] if masses else []
     dataset = import_reach2019(grasps, meshes, rule, ignore=ignore, unit=mesh_unit)
     write_dataset(dataset, out, ("parquet", "csv"))
-    rows = [
+    rows: list[dict[str, Any]] = [
         {
             "object": name,
             "grams": round(dataset.objects[name].mass * 1e3, 3),
@@ -74,9 +75,9 @@ def import_(
         return
     for row in rows:
         print(
-            f"{row['object']}: {row['grasps']} grasps, {row['trials']} trials, "
+            f"{row['object']}: {counted(row['grasps'], 'grasp')}, {counted(row['trials'], 'trial')}, "
             f"{row['successes']} lifted; {row['grams']:g} g ({row['mass_source']})"
         )
     for note in dataset.notes:
         print(note)
-    print(f"{len(dataset.trials)} trials -> {out}")
+    print(f"{counted(len(dataset.trials), 'trial')} -> {out}")

@@ -78,10 +78,10 @@ class SessionProgress:
 
     def scoring(self, waiting: int) -> None:
         """Tell how many takes still wait for their scores."""
-        self._bar.update(self._task, doing=f"scoring: {waiting} takes", left="-")
+        self._bar.update(self._task, doing=f"scoring: {waiting} left", left="-")
         quiet = self._console.is_terminal or waiting == self._scoring
         if waiting and not quiet and (self._scoring is None or waiting % 25 == 0):
-            self.say(f"scoring: {waiting} takes left")
+            self.say(f"scoring: {waiting} left")
         self._scoring = waiting
 
     def _look(self) -> None:

@@ -11,6 +11,7 @@ from typing import Any
 
 from logs.dataset.dataset import Dataset
 from logs.export.columns import Column, Kind, columns, scored_models
+from logs.numbers import counted
 
 CROISSANT_NAME = "croissant.json"
 _TYPES: Mapping[Kind, str] = {
@@ -81,8 +82,9 @@ def croissant_bytes(dataset: Dataset, hashes: Mapping[str, str]) -> bytes:
         "conformsTo": "http://mlcommons.org/croissant/1.0",
         "name": dataset.name,
         "description": (
-            f"{kind} grasp trials with success labels: {len(dataset.trials)} trials of "
-            f"{len(dataset.objects)} objects. {dataset.origin}"
+            f"{kind} grasp trials with success labels: "
+            f"{counted(len(dataset.trials), 'trial')} of "
+            f"{counted(len(dataset.objects), 'object')}. {dataset.origin}"
         ),
         "license": dataset.license or "not stated",
         "isLiveDataset": False,

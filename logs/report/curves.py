@@ -12,7 +12,7 @@ from reach.evaluation.table import Evaluation
 
 BINS = 10
 FEWEST_IN_BIN = 10
-"""Trials a dot of the calibration plot stands for, at least; a fiftieth of all if that is less."""
+"""Trials a dot of the calibration plot stands for, at least; a quarter of all if that is less."""
 
 
 def pooled(result: Evaluation) -> ObjectOutcomes:
@@ -79,11 +79,12 @@ def reliability_svg(result: Evaluation, name: str = "calibration", *, mark: str 
     with figure((4.6, 4.3)) as (canvas, axes):
         axes.plot([0, 1], [0, 1], color=color_of("oracle"), linewidth=0.8, linestyle=":")
         largest = everything.trials.sum()
+        bins = int(np.clip(largest // (2 * FEWEST_IN_BIN), 2, BINS))
         for row in result.rows:
             if row.name in ("constant", "oracle"):
                 continue
-            score, rate, trials = reliability_bins(everything, row.scores)
-            enough = trials >= min(FEWEST_IN_BIN, largest / 50)
+            score, rate, trials = reliability_bins(everything, row.scores, bins)
+            enough = trials >= min(FEWEST_IN_BIN, largest / 4)
             score, rate, trials = score[enough], rate[enough], trials[enough]
             color = color_of(row.name)
             graded = len(score) > 2  # a yes or no model has two points and no curve

@@ -8,11 +8,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from logs.footnotes import ORACLE, footnotes, shared_with_engine
+from logs.numbers import span
 from logs.report import sections
 from logs.report.coverage import PlanCoverage, coverage_svg
 from logs.report.curves import precision_recall_svg, reliability_svg
 from logs.report.drift import drift_svg, measure_drift
-from logs.report.numbers import span
 from logs.report.pressure import compare_pressure, pressure_svg
 from logs.report.reliability_map import ReliabilityPaint, probe_grasps, reliabilities
 from logs.report.rendering import data_uri, object_solid, render

@@ -8,7 +8,7 @@ from statistics import median
 from typing import Any
 
 from logs.footnotes import ORACLE, footnotes, shared_with_engine
-from logs.report.numbers import number, signed, span
+from logs.numbers import number, signed, span
 from logs.report.paper import PAPER_TABLE
 
 METRICS = ("ap", "ar", "f1", "mae", "brier")

@@ -46,6 +46,12 @@ class Gain:
             return None
         return self.ar >= RECALL_GAIN and self.ap >= 0.0
 
+    @property
+    def certain(self) -> bool:
+        """Whether both intervals lie where the finding does; without intervals they do not."""
+        ar, ap = self.ar_interval, self.ap_interval
+        return ar is not None and ap is not None and ar[0] >= RECALL_GAIN and ap[0] >= 0.0
+
     def to_json(self) -> dict[str, Any]:
         """The gain as plain JSON values."""
         return {
@@ -56,6 +62,7 @@ class Gain:
             "ap_interval": self.ap_interval and list(self.ap_interval),
             "ar_interval": self.ar_interval and list(self.ar_interval),
             "as_published": self.as_published,
+            "certain": self.certain,
         }
 
 

@@ -1,5 +1,7 @@
 """Metrics against scikit-learn, against numbers computed by hand, and at their known limits."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -275,7 +277,9 @@ def test_gain_is_paired_and_judged_as_the_paper_states_it():
     # Two thresholds more pass for every grasp: recall gains 2/11, the ranking is the same.
     assert gain.ar == pytest.approx(2 / 11) and gain.ap == pytest.approx(0)
     assert gain.ar_interval is None  # alike on all six objects: nothing is told of others
-    assert gain.as_published is True
+    assert gain.as_published is True and not gain.certain
+    sure = replace(gain, ar_interval=(0.12, 0.3), ap_interval=(0.0, 0.1))
+    assert sure.certain and not replace(sure, ar_interval=(0.1, 0.3)).certain
     (back,) = gains(everything, means, resampled, [("point", "reach")])
     assert back.as_published is False and back.ar == pytest.approx(-2 / 11)
     assert gains(everything, {"reach": means["reach"]}, resampled) == ()

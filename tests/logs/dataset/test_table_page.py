@@ -5,7 +5,7 @@ import json
 import pytest
 
 from collection.analysis.evaluating import evaluation_content
-from logs.report.numbers import span
+from logs.numbers import span
 from logs.report.table_page import table_page
 from reach.evaluation.compare import compare, scorers_of
 from reach.evaluation.protocol import run_protocol
@@ -91,7 +91,10 @@ def test_the_finding_is_stated_as_it_is(content):
     for ar, ap, verdict in ((0.2, 0.0, "yes"), (0.1, 0.1, "**no**"), (0.2, -0.01, "**no**")):
         changed = {**content, "gains": [{**gain, "ar": ar, "ap": ap, "as_published": None}]}
         changed["gains"][0]["as_published"] = ar >= 0.11 and ap >= 0
+        changed["gains"][0]["certain"] = True
         assert tables(table_page(changed, "x"))[1][2][-1] == verdict
+    changed["gains"][0] |= {"as_published": True, "certain": False}
+    assert tables(table_page(changed, "x"))[1][2][-1] == "yes, but less is not excluded"
     assert "were not both evaluated" in table_page({**content, "gains": []}, "x")
 
 

@@ -6,6 +6,11 @@ import math
 from collections.abc import Sequence
 
 
+def counted(count: int, noun: str) -> str:
+    """A number of things: `1 object`, `2 objects`."""
+    return f"{count} {noun}" if count == 1 else f"{count} {noun}s"
+
+
 def number(value: float | None, digits: int = 3) -> str:
     """A figure, or a dash where there is none."""
     return "–" if value is None else f"{value:.{digits}f}"
