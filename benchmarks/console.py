@@ -3,8 +3,11 @@
 Real key events in a real headless Chromium, on the real page of a session with a plan of many
 trials, its journal synced to the disk as ever, labels mirrored and scores arriving as in a session.
 A press counts from the browser's stamp of the key event to the moment the page's receipt says
-*stored*; half of the labels are a failure, whose clock starts at its second key. Prints one JSON
-object: milliseconds, and the machine's load, which they are to be read with.
+*stored*; half of the labels are a failure, whose clock starts at its second key. Keys are pressed on
+a page that has come to rest, as an operator's are, who watched the robot for seconds. With `--rush`
+they are pressed while it still draws the trial before: Chromium then holds back every answer until
+the frame that follows the key, or for 50 ms (its feature DeferRendererTasksAfterInput).
+Prints one JSON object: milliseconds, and the machine's load, which they are to be read with.
 """
 
 from __future__ import annotations
@@ -52,7 +55,11 @@ new MutationObserver(() => {
   const call = performance.getEntriesByType("resource").filter((e) => e.name.endsWith("/commands")).at(-1);
   window.presses.push([pressed, performance.now(), call?.startTime ?? NaN, call?.responseEnd ?? NaN]);
 }).observe(document.getElementById("receipt"), { attributes: true, attributeFilter: ["data-kind"] });
+window.changed = performance.now();
+new MutationObserver(() => { window.changed = performance.now(); })
+  .observe(document, { subtree: true, childList: true, characterData: true, attributes: true });
 """
+AT_REST = "return !document.getAnimations().length && performance.now() - window.changed > 150"
 
 
 def describe(trials: int) -> SessionDescriptor:
@@ -147,7 +154,7 @@ def wait(driver: Any, script: str, *arguments: Any) -> None:
     WebDriverWait(driver, 60, 0.05).until(lambda d: d.execute_script(script, *arguments), script)
 
 
-def measure(driver: Any, link: str, labels: int) -> np.ndarray:
+def measure(driver: Any, link: str, labels: int, *, rush: bool) -> np.ndarray:
     """Shape (labels, 4) [ms]: press to request, request to answer, answer to receipt, all."""
     driver.get("about:blank")
     driver.get(link)
@@ -162,6 +169,8 @@ def measure(driver: Any, link: str, labels: int) -> np.ndarray:
             str(n),
         )
         for key in ("s",) if n % 2 else ("f", "1"):
+            if not rush:
+                wait(driver, AT_REST)
             press(driver, key)
         wait(driver, "return window.presses.length === arguments[0]", n)
         driver.execute_script("document.getElementById('receipt').dataset.kind = 'none'")
@@ -189,6 +198,7 @@ def main() -> None:
     parser.add_argument("--labels", type=int, default=120)
     parser.add_argument("--rounds", type=int, default=3)
     parser.add_argument("--trials", type=int, default=1000, help="planned, labeled or not")
+    parser.add_argument("--rush", action="store_true", help="press before the page is at rest")
     parser.add_argument("--folder", type=Path, help="on the disk to measure; else a temporary one")
     arguments = parser.parse_args()
     rounds = []
@@ -197,7 +207,7 @@ def main() -> None:
             load = os.getloadavg()[0]
             with session(Path(scratch), arguments.trials) as (link, folder):
                 with browser(Path(scratch) / "profile") as driver:
-                    taken = measure(driver, link, arguments.labels)
+                    taken = measure(driver, link, arguments.labels, rush=arguments.rush)
             parts = (
                 "press_to_request",
                 "request_to_answer",
