@@ -25,6 +25,15 @@ from logs.journal.events import AnyEvent, Entry
 from logs.journal.state import SessionState, TrialState
 
 
+def uptime() -> float:
+    """Seconds since the machine started, also while it or the process slept.
+
+    A lid that was closed over a key press must not let it through when it opens: Linux's usual
+    monotonic clock stands still meanwhile.
+    """
+    return time.clock_gettime(getattr(time, "CLOCK_BOOTTIME", time.CLOCK_MONOTONIC))
+
+
 class EventSink(Protocol):
     """Where events go: the journal, or nowhere in practice mode."""
 
@@ -44,7 +53,7 @@ class SessionController:
         journal: open journal, or a sink that stores nothing.
         state: fold of the journal's entries; the controller keeps it up to date.
         stop: halts the robot at once; called from any thread, must not wait for anything.
-        clock: seconds, monotonic; also runs while the process is frozen.
+        clock: seconds, monotonic; also runs while the process is frozen or the machine asleep.
         trials_left: how many more trials fit on the session's disk; None if nobody needs to know.
     """
 
@@ -54,7 +63,7 @@ class SessionController:
         state: SessionState,
         *,
         stop: Callable[[], None] = lambda: None,
-        clock: Callable[[], float] = time.monotonic,
+        clock: Callable[[], float] = uptime,
         trials_left: Callable[[], int] | None = None,
     ) -> None:
         self._journal = journal

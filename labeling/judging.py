@@ -74,7 +74,8 @@ def revision(state: SessionState, command: Command) -> int:
 def _staleness(state: SessionState, command: Command, now: float) -> str:
     if command.kind is CommandKind.STOP:
         return ""
-    if command.tick is not None and now - command.tick > COMMAND_AGE_LIMIT:
+    # A tick of the future, or none at all (nan), is nothing this server ever said.
+    if command.tick is not None and not 0 <= now - command.tick <= COMMAND_AGE_LIMIT:
         return f"the command is older than {COMMAND_AGE_LIMIT:g} s"
     if command.kind in NEEDS_REVISION and command.rev != revision(state, command):
         return "something changed since this was on the screen; look again"

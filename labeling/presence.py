@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 import asyncio
-import time
 from collections.abc import Callable
 from typing import Final
 
-from labeling.controller import SessionController
+from labeling.controller import SessionController, uptime
 from logs.errors import JournalWriteError
 
 CAUSE: Final = "console"
@@ -27,7 +26,7 @@ class Presence:
     """
 
     def __init__(
-        self, controller: SessionController, *, clock: Callable[[], float] = time.monotonic
+        self, controller: SessionController, *, clock: Callable[[], float] = uptime
     ) -> None:
         self._controller = controller
         self._clock = clock

@@ -111,6 +111,9 @@ def test_a_command_is_stale_after_two_seconds_but_a_stop_never(make_bench: Any) 
     assert bench.controller.submit(stop, BOB).status == "stored"
     assert stops == [102.1]
     bench.do("clear_stop", confirm=True)
+    for never_said in (102.2, float("nan"), float("inf")):
+        forged = command.model_copy(update={"tick": never_said})
+        assert bench.controller.submit(forged, BOB).status == "stale"
     fresh = command.model_copy(update={"tick": 100.2})
     assert bench.controller.submit(fresh, BOB).status == "stored"
 
