@@ -108,6 +108,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return _complain(str(error), 2)
     except BrokenPipeError:
         return 0  # the reader of our output (head, less) has seen enough
+    except SystemExit as left:  # tables and help meet the closed pipe in their own way
+        if not isinstance(left.__context__, BrokenPipeError):
+            raise
+        return 0
     except OSError as error:
         return _complain(_of_the_system(error), 2)
     except ImportError as error:

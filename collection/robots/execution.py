@@ -103,11 +103,6 @@ class Execution:
     put_down_early: bool = False
 
     @property
-    def closed_ns(self) -> int:
-        """When the jaws began to close [ns]."""
-        return next(span.start_ns for span in self.phases if span.phase is Phase.CLOSE)
-
-    @property
     def measurements(self) -> dict[str, float]:
         """The readings that a table of trials shows, SI units."""
         verdict = self.sensor_verdict

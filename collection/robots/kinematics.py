@@ -71,11 +71,6 @@ class SerialChain:
             [np.swapaxes(axes, -1, -2), np.swapaxes(np.cross(axes, arms), -1, -2)], axis=-2
         )
 
-    def within_limits(self, joints: FloatArray, tolerance: float = 1e-9) -> bool:
-        """Whether a configuration (J,) respects every limit."""
-        low, high = self.lower - tolerance, self.upper + tolerance
-        return bool(np.all(joints >= low) and np.all(joints <= high))
-
 
 def from_table(
     rows: list[tuple[tuple[float, float, float], tuple[float, float, float], float, float, float]],

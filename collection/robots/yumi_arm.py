@@ -18,7 +18,6 @@ from reach.arrays import FloatArray, frozen
 from reach.gripper import ParallelJawGripper
 from reach.transforms import make_transform, rotation_about
 
-SIDES = ("right", "left")
 JOINT_NAMES = ("joint_1", "joint_2", "joint_7", "joint_3", "joint_4", "joint_5", "joint_6")
 """In kinematic order; the controller counts 1 to 6, with joint 7 as its external axis."""
 CONTROLLER_ORDER = (0, 1, 3, 4, 5, 6, 2)

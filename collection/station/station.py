@@ -197,11 +197,6 @@ def find_station_file(name_or_path: str | Path) -> Path:
     raise UnknownNameError("station (no file, and no packaged one)", str(path), station_names())
 
 
-def example_station() -> str:
-    """A commented station file."""
-    return (PACKAGED / "simulated.toml").read_text(encoding="utf-8")
-
-
 def read_station(name_or_path: str | Path) -> StationConfig:
     """Read and validate a station file.
 

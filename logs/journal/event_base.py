@@ -2,13 +2,23 @@
 
 from __future__ import annotations
 
-from typing import Annotated
+from typing import Annotated, Any
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Field
 
 from logs.journal.vocabulary import Source
 
-Text = Annotated[str, Field(max_length=2000)]
+LONGEST_TEXT = 2000
+"""Of a reason or a note [characters]; a console refuses a longer note from a person."""
+
+
+def _shortened(text: Any) -> Any:
+    """Cut a text that is too long: how a fault is worded must not keep it out of the journal."""
+    too_long = isinstance(text, str) and len(text) > LONGEST_TEXT
+    return f"{text[: LONGEST_TEXT - 4]} ..." if too_long else text
+
+
+Text = Annotated[str, BeforeValidator(_shortened)]
 TakeNumber = Annotated[int, Field(ge=1)]
 
 

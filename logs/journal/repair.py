@@ -59,9 +59,9 @@ def repair_journal(path: Path, clock: Callable[[], int] = time.time_ns) -> Journ
     touched = _touched(scan)
     text = "; ".join(problems) or f"events {sorted(lost)} are missing"
     last = max([*(entry.seq for entry in scan.entries), *lost], default=0)
-    why = f"the journal lost a line that may have decided about this trial ({text})"[:2000]
+    why = f"the journal lost a line that may have decided about this trial ({text})"
     events: list[AnyEvent] = [
-        JournalRepaired(lost=tuple(sorted(lost)), text=text[:2000]),
+        JournalRepaired(lost=tuple(sorted(lost)), text=text),
         *(NeedsLabel(trial_id=trial_id, why=why) for trial_id in touched),
     ]
     added = [

@@ -147,6 +147,15 @@ def test_version_is_printed(capsys):
     assert capsys.readouterr().out.startswith(f"reach-trials {metadata.version('reach-trials')}")
 
 
+@pytest.mark.parametrize("words", ["--help", "collect --help", "objects", "objects --json"])
+def test_a_reader_who_has_seen_enough_is_no_fault(words):
+    reading, writing = os.pipe()
+    os.close(reading)
+    with os.fdopen(writing, "wb") as nobody:
+        done = subprocess.run([REACH, *words.split()], stdout=nobody, stderr=subprocess.PIPE)
+    assert (done.returncode, done.stderr) == (0, b"")
+
+
 @pytest.mark.parametrize("arguments", [["--help"], ["status", "--help"]])
 def test_help_imports_nothing_heavy(arguments):
     heavy = ["numpy", "open3d", "trimesh", "rerun", "pandas", "numba", "mujoco", "matplotlib"]

@@ -18,7 +18,6 @@ from collection.station.station import (
     PACKAGED,
     Station,
     build_station,
-    example_station,
     load_station,
     parse_station,
 )
@@ -119,7 +118,11 @@ def test_a_thin_part_that_is_lifted_is_seen_by_the_hand(station: Station, thickn
 def test_a_bar_held_near_its_end_turns_and_counts_as_lifted_but_rotated() -> None:
     mesh = trimesh.creation.box((0.02, 0.10, 0.02))
     bar = GraspObject("bar", mesh.vertices, mesh.faces, 0.4)  # 157 N mm about the pads
-    text = example_station().replace("friction = [0.3, 0.6]", "friction = [0.5, 0.5]", 1)
+    text = (
+        (PACKAGED / "simulated.toml")
+        .read_text()
+        .replace("friction = [0.3, 0.6]", "friction = [0.5, 0.5]", 1)
+    )
     text = text.replace("pad_modulus = [0.4e6, 0.9e6]", "pad_modulus = [0.6e6, 0.6e6]", 1)
     with build_station(parse_station(text, "test.toml"), text, PACKAGED, 0) as station:
         T = place(station, bar, seed=2) @ make_transform(None, (0, 0.04, 0))

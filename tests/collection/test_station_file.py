@@ -14,7 +14,6 @@ from collection.errors import CameraTimeoutError, StationFileError
 from collection.station.station import (
     PACKAGED,
     build_station,
-    example_station,
     find_station_file,
     load_station,
     parse_station,
@@ -34,7 +33,7 @@ def line_of(text: str, part: str) -> int:
 
 
 def test_the_example_is_a_valid_station() -> None:
-    config = parse_station(example_station(), "example.toml")
+    config = parse_station(SIMULATED, "example.toml")
     assert config.name == "simulated"
     assert config.motion.closing_force == 20.0
     assert "simulated" in station_names()

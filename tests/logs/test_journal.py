@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from logs.errors import JournalDamagedError, JournalWriteError, SessionLockedError
-from logs.journal.events import JournalRepaired, Noted, Source
+from logs.journal.events import JournalRepaired, Noted, SessionClosed, Source
 from logs.journal.file import (
     JOURNAL_NAME,
     TORN_NAME,
@@ -169,6 +169,14 @@ def test_a_short_write_leaves_nothing_and_the_next_event_fits(
         monkeypatch.setattr(os, "write", write)
         journal.append(note("fits"))
     assert texts(path) == ["fits"]
+
+
+def test_a_fault_told_at_length_is_stored_in_short(path: Path) -> None:
+    with Journal(path) as journal:
+        journal.append(SessionClosed(status="failed", reason="why " * 1000))
+    closed = read_journal(path)[-1].event
+    assert isinstance(closed, SessionClosed)
+    assert closed.reason == ("why " * 1000)[:1996] + " ..."
 
 
 def test_a_closed_journal_takes_no_events(path: Path) -> None:
