@@ -23,7 +23,7 @@ import numpy as np
 from reach.arrays import FloatArray
 from reach.errors import InvalidInputError
 from reach.evaluation.cases import GraspCase
-from reach.evaluation.scoring import Scorer, score_cases
+from reach.evaluation.scoring import Scorer, score_draws
 from reach.pose_error import PoseError
 
 GRID: Mapping[str, tuple[float, ...]] = {
@@ -129,9 +129,10 @@ def fit_parameters(
         model: a robust model.
         samples: perturbations a score.
         seed: of the perturbations, the same for every grid point.
-        grid: values of friction, compliance or stiffness, and pose error; the model's own if None.
+        grid: values of friction, compliance or stiffness, and, last, pose error; the model's own
+            if None.
         backend: see [score_cases][reach.evaluation.scoring.score_cases].
-        progress: called with the number of grid points done, and their total.
+        progress: called with the number of grasps done, once for each pose error, and their total.
 
     Raises:
         InvalidInputError: too few grasps for three parameters.
@@ -141,34 +142,47 @@ def fit_parameters(
             f"{len(cases)} labeled grasps cannot tell three parameters; it takes {FEWEST_GRASPS}"
         )
     grid = grid_of(model) if grid is None else grid
+    *contact, (_, errors) = grid.items()
     names = tuple(grid)
-    points = list(itertools.product(*grid.values()))
-    likelihood = np.empty([len(values) for values in grid.values()])
-    reliabilities = []
-    for number, point in enumerate(points):
-        values = dict(zip(names, point, strict=True))
-        error = values.pop("translation")
-        scored = score_cases(
-            cases,
-            make(model, samples=samples, **values),
-            pose_error=PoseError.isotropic(
-                translation=error, rotation=ROTATION_PER_TRANSLATION * error
-            ),
-            seed=seed,
-            backend=backend,
-        )
-        reliabilities.append(scored.values)
-        likelihood.flat[number] = log_likelihood(cases, scored.values, samples)
-        if progress:
-            progress(number + 1, len(points))
-    best = np.unravel_index(int(np.argmax(likelihood)), likelihood.shape)
-    overdispersion = _overdispersion(cases, reliabilities[int(np.argmax(likelihood))], samples)
+    sets = [
+        make(model, samples=samples, **dict(zip(names, values, strict=False)))
+        for values in itertools.product(*(values for _, values in contact))
+    ]
+    reliabilities = np.stack(
+        [
+            score_draws(
+                cases,
+                sets,
+                pose_error=PoseError.isotropic(
+                    translation=error, rotation=ROTATION_PER_TRANSLATION * error
+                ),
+                seed=seed,
+                backend=backend,
+                progress=_part_of(progress, number, len(errors)),
+            )
+            for number, error in enumerate(errors)
+        ],
+        axis=1,
+    )
+    shape = [len(values) for values in grid.values()]
+    points = reliabilities.reshape(-1, len(cases))
+    likelihood = np.array([log_likelihood(cases, p, samples) for p in points]).reshape(shape)
+    top = int(np.argmax(likelihood))
+    best = np.unravel_index(top, likelihood.shape)
+    overdispersion = _overdispersion(cases, points[top], samples)
     drop = (likelihood - likelihood.max()) / overdispersion
     fitted = {
         name: _profiled(name, grid[name], drop, axis, int(best[axis]))
         for axis, name in enumerate(names)
     }
     return Fit(fitted, overdispersion, len(cases), sum(case.trials for case in cases))
+
+
+def _part_of(progress: Progress | None, number: int, parts: int) -> Progress | None:
+    """Progress of one of several equal parts as progress of the whole."""
+    if progress is None:
+        return None
+    return lambda done, total: progress(number * total + done, parts * total)
 
 
 def log_likelihood(cases: Sequence[GraspCase], values: FloatArray, samples: int) -> float:
