@@ -1,10 +1,14 @@
 """The Markdown page says what the JSON says, beside the paper's figures, and what was found."""
 
+import io
 import json
+import re
 
 import pytest
+from rich.console import Console
 
 from collection.analysis.evaluating import evaluation_content
+from collection.cli.evaluation_table import evaluation_table
 from logs.numbers import span
 from logs.report.table_page import table_page
 from reach.evaluation.compare import compare, scorers_of
@@ -113,6 +117,18 @@ def test_the_oracle_is_called_a_ceiling_only_of_what_it_bounds(content):
     for key in ("mae", "brier"):
         assert all(row[key] >= models["oracle"][key] for row in models.values())
     assert "bounds neither AR nor F1" in table_page(content, "x")
+
+
+def test_the_printed_tables_fit_into_eighty_columns(content):
+    """Nothing is cut off, and every row of the JSON stands there."""
+    screen = Console(width=80, record=True, file=io.StringIO())
+    for table in evaluation_table(content):
+        screen.print(table)
+    text = screen.export_text()
+    assert "…" not in text
+    for name, row in content["models"].items():
+        assert re.search(rf"^ *{name} +{row['ap']:.3f} ", text, re.MULTILINE)
+    assert "unsaturated" in text
 
 
 def test_intervals_are_rounded_outward_and_explained(content):
