@@ -6,7 +6,7 @@ from typing import Final
 
 from pydantic import BaseModel, ConfigDict
 
-from labeling.view import View, label_view, trial_view
+from labeling.view import View, label_view, to_judge, trial_view
 from logs.journal.events import LabelEvent, Outcome
 from logs.journal.state import SessionState, TakeState, TrialState
 
@@ -54,10 +54,14 @@ def review_list(state: SessionState, wanted: Filter, *, second: str | None) -> l
     return [
         _item(trial, take, take.label if second is None else take.second_labels.get(second))
         for trial in state.trials.values()
-        if (take := trial.valid_take) is not None and not trial.skipped
-        if second is None or (take.label is not None and take.label.operator != second)
+        if (take := executed_take(trial) if second is None else to_judge(trial, second))
         if matches(trial, take, wanted)
     ]
+
+
+def executed_take(trial: TrialState) -> TakeState | None:
+    """The take that counts, unless the trial is skipped."""
+    return None if trial.skipped else trial.valid_take
 
 
 def matches(trial: TrialState, take: TakeState, wanted: Filter) -> bool:

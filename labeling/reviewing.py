@@ -32,6 +32,7 @@ def review_console(
     """
     journal = folder.open_journal()
     state = SessionState.fold(folder.descriptor.trials, journal.entries)
+    state.stand_down()
     sink = MirroredJournal(journal, AnnotationMirror(folder, journal.entries))
     controller = SessionController(sink, state)
     try:

@@ -19,6 +19,7 @@ _BANNERS: Final = {
     "EXECUTE": "The robot moves: keep clear",
     "AWAITING_LABEL": "Was it stably lifted?  {object}",
     "RESET": "Going home",
+    "REVIEW": "Recorded trials are looked at on the page, in a browser",
     "PAUSED": "Paused: nothing new starts",
     "HELD": "The station holds: {holds}",
     "STOPPED": "STOPPED -- c clears the stop",
@@ -64,7 +65,7 @@ def trial_text(view: View, *, rotated: bool) -> Table:
     if trial is None:
         return table
     take = f", take {trial['take']}" if trial["take"] > 1 else ""
-    table.add_row("trial", f"{trial['number']} of {trial['of']}{take}")
+    table.add_row("trial", f"{trial['number']} of {view['of']}{take}")
     table.add_row("object", escape(trial["object"]))
     table.add_row("step", trial["phase"].replace("_", " ").lower())
     if trial["again_because"]:

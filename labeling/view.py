@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from dataclasses import asdict
 from typing import Any, Final
 
 from labeling.console import Console, no_recording
@@ -29,7 +30,6 @@ def console_view(console: Console) -> View:
     """Everything a console shows at this moment, consistent within itself."""
     controller = console.controller
     with controller.reading() as state:
-        counts = state.counts()
         return {
             "tick": controller.tick(),
             "version": controller.version,
@@ -38,7 +38,7 @@ def console_view(console: Console) -> View:
             "operator": console.actor.operator,
             "simulated": console.simulated,
             "practice": console.practice,
-            "state": overall_state(state, closed=controller.closed),
+            "state": _state(console, state),
             "stopped": state.stopped,
             "paused": state.paused,
             "holds": dict(state.holds),
@@ -46,9 +46,8 @@ def console_view(console: Console) -> View:
             "lights": {
                 name: {"ok": ok, "text": text} for name, (ok, text) in controller.lights.items()
             },
-            "counts": {
-                name: getattr(counts, name) for name in counts.__slots__ if name != "successes"
-            },
+            "counts": _counts(console, state),
+            "of": len(state.trials),
             "disk_left": controller.disk.left,
             "disk_low": controller.disk.low,
             **_verdicts(console, state),
@@ -60,6 +59,32 @@ def console_view(console: Console) -> View:
             "recent_commands": list(state.commands)[-REMEMBERED_COMMANDS:],
             "next": _upcoming(state),
         }
+
+
+def _state(console: Console, state: SessionState) -> str:
+    closed = console.controller.closed
+    if console.mode == "review":
+        return "ENDED" if closed else "REVIEW"
+    return overall_state(state, closed=closed)
+
+
+def _counts(console: Console, state: SessionState) -> View:
+    """The session in numbers; to a second operator, their own work in it."""
+    counts = {name: value for name, value in asdict(state.counts()).items() if name != "successes"}
+    if not console.second:
+        return counts
+    operator = console.actor.operator
+    takes = [take for trial in state.trials.values() if (take := to_judge(trial, operator))]
+    done = sum(operator in take.second_labels for take in takes)
+    return {**counts, "planned": len(takes), "labelled": done, "unlabelled": len(takes) - done}
+
+
+def to_judge(trial: TrialState, operator: str) -> TakeState | None:
+    """The take of a trial that a second operator may judge: one that somebody else has labeled."""
+    take = trial.valid_take
+    if take is None or trial.skipped or take.label is None or take.label.operator == operator:
+        return None
+    return take
 
 
 def _verdicts(console: Console, state: SessionState) -> View:
@@ -147,7 +172,6 @@ def _current(console: Console, state: SessionState) -> View | None:
         return None
     return {
         **trial_view(trial, take),
-        "of": len(state.trials),
         "pictures": list(console.pictures.names(trial.trial_id, take.take)),
     }
 

@@ -37,6 +37,7 @@ const BANNERS = {
   CONFIRM_POSE: (trial) => ["Which pose is right?", `${1 + (trial.info.rivals ?? []).length} poses explain the image equally well.`],
   EXECUTE: () => ["The robot moves", "Keep clear. Watch whether the object is held."],
   AWAITING_LABEL: (trial) => ["Was it stably lifted?", trial.recovered ? "This record was saved after a crash; label it if you saw it, else redo." : "Clear of the table by 50 mm and still held after 1 s."],
+  REVIEW: () => ["Nothing to look at", "No executed trial fits this filter."],
   RESET: () => ["Going home", "The robot opens its jaws and leaves the table."],
   PAUSED: () => ["Paused", "Nothing new starts until you resume."],
   STOPPED: () => ["STOPPED", "Nothing moves until the stop is cleared."],
@@ -113,9 +114,9 @@ function againBanner(trial, view) {
   return [`Label trial ${trial.number} again: ${words(trial.object)}`, trial.label ? `It says ${describeLabel(trial.label)}.` : "It has no label now."];
 }
 
-export function drawTrial(trial, state) {
+export function drawTrial(trial, of, state) {
   text("trial-number", trial?.number ?? "–");
-  text("trial-of", trial?.of ?? "–");
+  text("trial-of", of);
   text("trial-take", trial && trial.take > 1 ? `, take ${trial.take}` : "");
   text("trial-object", words(trial?.object ?? "–"));
   text("trial-pose", trial && trial.stable_pose !== null ? `resting pose ${trial.stable_pose}` : "");

@@ -96,7 +96,7 @@ function wire() {
 
 // A past trial whose label is given again: its recording and name, not the present trial's.
 function shownAgain(trial) {
-  return { ...trial, of: page.view.counts.planned, stable_pose: null, phase: "AWAITING_LABEL", pictures: [] };
+  return { ...trial, stable_pose: null, phase: "AWAITING_LABEL", pictures: [] };
 }
 
 function onEnd() {
@@ -132,10 +132,10 @@ function paint() {
   drawSession(view, link.alive);
   const target = about.target();
   const past = target?.kind === "relabel" && view.mode === "run";
-  const trial = view.mode === "review" ? review.shown(view) : past ? shownAgain(target) : view.trial;
+  const trial = view.mode === "review" ? review.chosen() : past ? shownAgain(target) : view.trial;
   const again = (view.mode === "review" || past) && !["LOST", "STOPPED"].includes(state) ? target : null;
   drawBanner(state, view, link.problem, again);
-  drawTrial(trial, state);
+  drawTrial(trial, view.of, state);
   const usable = link.alive && !commands.pending;
   drawActions(page, state, target, usable, usable && !review.justCame());
   drawChoices(page, actions.choices(), usable, allowSound);
@@ -144,7 +144,9 @@ function paint() {
       if (chosen.status !== "skipped") page.relabel = chosen.trial_id;
       draw();
     }))));
-  byId("past").hidden = byId("by-object").hidden = view.mode === "review";
+  for (const id of ["past", "by-object", "steps", "disk", "time", "light-robot", "light-camera"]) {
+    byId(id).hidden = view.mode === "review";
+  }
   stage.draw(view, trial);
 }
 

@@ -39,11 +39,6 @@ export class Review {
     setTimeout(this.onChange, LOOK_MS + 1);
   }
 
-  shown(view) {
-    const trial = this.chosen();
-    return trial ? { ...trial, of: view.counts.planned } : null;
-  }
-
   refresh(view) {
     byId("review").hidden = false;
     // A list of successes would show a second operator the first one's verdicts.

@@ -125,6 +125,11 @@ class SessionState:
         ]
         return max(given, key=lambda pair: pair[1].seq, default=None)
 
+    def stand_down(self) -> None:
+        """Nobody leads the session: a stop, pause or hold of its last sitting is over."""
+        self.paused = self.stopped = False
+        self.holds.clear()
+
     def apply(self, entry: Entry) -> None:
         """Add one entry."""
         event = entry.event
@@ -174,8 +179,7 @@ class SessionState:
         self.segment, self.fingerprints = event.segment, event.fingerprints
         self.segments.append(event)
         self.closed = None
-        self.paused = self.stopped = False
-        self.holds.clear()
+        self.stand_down()
         self._disclosure.note_all(event.operator)
 
     def _stop(self) -> None:

@@ -9,9 +9,10 @@ from typing import Any
 
 import pytest
 
+from labeling.access import make_access
 from labeling.commands import Actor
 from labeling.console import Console
-from labeling.server import ConsoleServer
+from labeling.server import ConsoleServer, free_port
 from logs.journal.events import Phase, Source
 from logs.journal.file import read_journal
 
@@ -54,7 +55,7 @@ class Page:
         driver.get("about:blank")
         driver.get(link)
         self.wait("return document.body.dataset.ready === 'true'")
-        self.until_state("READY", "PLACE_OBJECT", "AWAITING_LABEL", "STOPPED", "HELD")
+        self.until_state("READY", "PLACE_OBJECT", "AWAITING_LABEL", "STOPPED", "HELD", "REVIEW")
 
     def run(self, script: str, *arguments: Any) -> Any:
         return self.driver.execute_script(script, *arguments)
@@ -368,6 +369,28 @@ def test_undo_in_a_review_walks_back_this_sitting_only(bench: Any, reviewing: Pa
     reviewing.press("t")
     reviewing.wait("return document.getElementById('do-rotated').ariaPressed === 'true'")
     assert labels(bench)[-3:] == ["relabel", "undo", "undo"]
+
+
+def test_the_buttons_judge_trials_of_a_session_that_ended_in_a_stop(
+    bench: Any, serve: Any, browser: Any
+) -> None:
+    from labeling.reviewing import review_console
+    from logs.session.folder import SessionFolder
+
+    bench.labelled("success")
+    bench.do("stop")
+    bench.controller.close("ended")
+    with review_console(SessionFolder.open(bench.folder.path), BO) as console:
+        access = make_access("127.0.0.1", free_port(), token="t" * 24)
+        with ConsoleServer(console, access) as server:
+            page = Page(browser, server.link)
+            page.on_stage("1")
+            page.element("do-failure").click()
+            page.wait("return document.querySelectorAll('#choices button').length === 6")
+            page.run("document.querySelector('#choices button').click()")
+            page.receipt("stored")
+            with console.controller.reading() as state:
+                assert state.order[0].label.reason == "missed"
 
 
 def test_a_second_press_is_not_a_verdict_on_the_trial_that_just_came_up(
