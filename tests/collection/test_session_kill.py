@@ -220,3 +220,4 @@ def _check_whole(out: Path) -> None:
     assert (out / "report.html").exists()
     hidden = [path.name for path in out.parent.glob(f".{out.name}.new-*")]
     assert not hidden, "an unfinished folder was left behind"
+    assert not [*out.rglob(".*.rrd.*")], "an unfinished view was left behind"
