@@ -146,7 +146,7 @@ def _label(
     if take is None or not awaiting:
         raise RefusedError("a label is taken only after the robot has executed the trial")
     if take.label is not None:
-        raise RefusedError("this trial is labelled already; relabel it, or undo the label")
+        raise RefusedError("this trial is labeled already; relabel it, or undo the label")
     return _make(ev.Labelled, who, take=take.take, blind=blind, **value.model_dump())
 
 

@@ -113,7 +113,7 @@ def overall_state(state: SessionState, *, closed: bool = False) -> str:
 
 
 def success_by_object(state: SessionState) -> dict[str, list[int]]:
-    """Successes and labelled trials per object."""
+    """Successes and labeled trials per object."""
     table: dict[str, list[int]] = {}
     for trial in state.trials.values():
         label = trial.label

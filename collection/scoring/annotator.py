@@ -1,4 +1,4 @@
-"""Scores labelled takes and draws their views, in a process beside the session.
+"""Scores labeled takes and draws their views, in a process beside the session.
 
 Predictions are made after the label, so that nobody at the station could have seen one before.
 The journal is told first; the annotation files mirror its events.
@@ -101,7 +101,7 @@ class Annotator:
         return bool(self._missing(take)) or not view.exists()
 
     def annotate(self, trial_id: str, take: TakeState) -> None:
-        """Annotate a labelled take soon: the scores it lacks, then its view."""
+        """Annotate a labeled take soon: the scores it lacks, then its view."""
         assert take.record is not None
         folder = (self._session.path / take.record).parent
         job = self._submit(_score, folder, self._missing(take), self._pose_error)
@@ -160,7 +160,7 @@ class Annotator:
     def _result(self, job: Future[_Result], failed: str) -> _Result | None:
         try:
             return job.result()
-        except Exception as error:  # whatever it was: the trial is recorded and labelled
+        except Exception as error:  # whatever it was: the trial is recorded and labeled
             self._say(f"{failed}: {type(error).__name__}: {error}")
             return None
 

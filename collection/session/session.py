@@ -92,7 +92,7 @@ class Session:
             clock.begin_at(last_recorded_ns(self.context.session_path))
 
     def annotate_earlier(self) -> None:
-        """Annotate what an earlier process labelled and did not live to annotate."""
+        """Annotate what an earlier process labeled and did not live to annotate."""
         with self.controller.reading() as state:
             trials = [trial for trial in state.order if trial.status == "labelled"]
         for trial in trials:

@@ -34,7 +34,7 @@ class SummaryRow:
 
     @property
     def success_rate(self) -> float | None:
-        """Share of successes; None without a labelled trial."""
+        """Share of successes; None without a labeled trial."""
         return self.successes / self.trials if self.trials else None
 
 

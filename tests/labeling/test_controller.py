@@ -89,7 +89,7 @@ def test_a_label_is_taken_only_after_the_robot_has_executed(bench: Any, phase: s
             take.advance(Phase.EXECUTE)
     answer = bench.do("label", 1, outcome="success")
     assert answer.status == "rejected"
-    assert "labelled already" in answer.message or "only after" in answer.message
+    assert "labeled already" in answer.message or "only after" in answer.message
     assert kinds(bench).count("label") == (phase == "labelled")
 
 
