@@ -3,8 +3,8 @@
 A part on a table is pushed at a point or along an edge, and turns. The forces that resist it, friction
 on the table when it is slow and inertia when it is fast, are taken for an ellipsoid with the
 part's radius of gyration k about the vertical: the twist is proportional to the force that
-pushes, torque over k ([Goyal1991] Sect. 5, [Peshkin1988]). Friction on the pad keeps the contact
-from sliding along it up to mu times the normal force.
+pushes, torque over k ([Goyal1991] Sect. 5, [Peshkin1988]). Friction across the pad is left out: a
+light part is knocked ahead of the pad and does not stick to it (docs/decisions/0094).
 
 Sources:
     [Goyal1991] Goyal, Ruina, Papadopoulos, Planar sliding with dry friction, Wear 143, 1991.
@@ -24,7 +24,7 @@ from reach.kernels.settle_motion import moved
 from reach.kernels.settle_pads import list_all, preload_of, press_all
 from reach.kernels.settle_room import SLACK, Hand, Room
 from reach.kernels.tree import MeshTree
-from reach.kernels.verdict import compose, to_wrench_frame
+from reach.kernels.verdict import to_wrench_frame
 
 PUSH_FORCE = 0.2
 """Force of a pad that pushes [N]: a few times what a part of 10 g on a table resists with, far below
@@ -73,7 +73,7 @@ def push(
     light = Hand(hand.com, PUSH_FORCE, 0.0, hand.stiffness, hand.length)
     found, used = list_all(mesh, pads, T, room), 0.0
     gain, last = 1.0, 0.0
-    q = np.empty(3)
+    arm, q = hand.length / gyration, np.empty(3)
     for _ in range(MOST_PUSHES):
         _, lost = press_all(mesh, pads, T, light, found, room)
         if lost and used > 0.0:  # the candidates may have run out, not the part
@@ -86,8 +86,7 @@ def push(
         T_frame, _ = to_wrench_frame(T, hand.com, np.zeros(3))
         room.wrench[:] = 0.0
         preload_of(pads, first, T_frame, light, found[first], room, START)
-        T_pad = compose(T_frame, pads.T_gripper_pad[first])
-        pushed_twist(motions, room.wrench, room.centers[first], T_pad, hand, gyration, q, gain)
+        pushed_twist(motions, room.wrench, arm, gain, q)
         gain = gain * CALMER if q[2] * last < 0.0 else min(1.0, gain * LIVELIER)
         last = q[2]
         size = np.sqrt(q[0] * q[0] + q[1] * q[1] + q[2] * q[2])
@@ -97,7 +96,7 @@ def push(
         twist = np.zeros(6)
         for i in range(6):
             twist[i] = q[0] * motions[0, i] + q[1] * motions[1, i]
-            twist[i] += q[2] * hand.length / gyration * motions[2, i]
+            twist[i] += q[2] * arm * motions[2, i]
         used += 2.0 * length * size
         if used > SLACK:
             found, used = list_all(mesh, pads, T, room), 2.0 * length * size
@@ -128,57 +127,30 @@ def way_left(pads: Pads, first: int, lost: int, room: Room) -> float:
 
 @compiled
 def pushed_twist(
-    motions: FloatArray,
-    wrench: FloatArray,
-    center_pad: FloatArray,
-    T_frame_pad: FloatArray,
-    hand: Hand,
-    gyration: float,
-    q: FloatArray,
-    gain: float,
+    motions: FloatArray, wrench: FloatArray, arm: float, gain: float, q: FloatArray
 ) -> None:
     """Find how a part moves while a pad that pushes it travels a unit of length.
 
-    With n and t the generalized directions of pressure and of friction across the closing axis,
-    the motion is q = f_n n + f_t t: of unit travel, n . q = 1, and without slip across, t . q = 0,
-    unless that takes more friction than |f_t| <= mu f_n.
+    With n the generalized direction of the pressure, the motion is along n, and of unit travel:
+    n . q = 1.
 
     Args:
         motions: see [push][reach.kernels.settle_push.push].
         wrench: of the pad's pressure, torques scaled, shape (6,).
-        center_pad: center of pressure, pad frame, shape (3,) [m].
-        T_frame_pad: pose of the pad, origin at the center of mass, shape (4, 4).
-        hand: what does not change.
-        gyration: radius [m].
+        arm: torque scale over the radius of gyration.
+        gain: part of the rotation to take.
         q: receives slide across, slide along, and yaw times the radius, shape (3,); zeros if the
             pad does not press.
-        gain: part of the rotation to take.
     """
-    n, c = np.zeros(3), np.empty(3)
+    n = np.zeros(3)
     for m in range(3):
         for i in range(6):
             n[m] += motions[m, i] * wrench[i] / PUSH_FORCE
-    n[2] *= hand.length / gyration
+    n[2] *= arm
+    travel = n[0] * n[0] + n[1] * n[1] + gain * n[2] * n[2]
+    q[0], q[1], q[2] = n[0], n[1], gain * n[2]
     for i in range(3):
-        c[i] = T_frame_pad[i, 3]
-        for j in range(3):
-            c[i] += T_frame_pad[i, j] * center_pad[j]
-    lever = 0.0  # of friction across: up . (c x across)
-    for i in range(3):
-        j, k = (i + 1) % 3, (i + 2) % 3
-        lever += motions[2, 3 + i] * (c[j] * motions[0, k] - c[k] * motions[0, j])
-    lever /= gyration
-    sticking = -(n[0] + n[2] * lever) / (1.0 + lever * lever)
-    ratio = min(hand.friction, max(-hand.friction, sticking))
-    if n[0] * (n[0] + ratio) + n[1] * n[1] + n[2] * (n[2] + ratio * lever) < 0.1 * n[1] * n[1]:
-        ratio = sticking  # wedged between friction and its lever: it can only stick
-    q[0], q[1], q[2] = n[0] + ratio, n[1], gain * (n[2] + ratio * lever)
-    travel = max(n[0] * q[0] + n[1] * q[1] + n[2] * q[2], 0.1 * n[1] * n[1])
-    if not travel > 0.0:
-        q[:] = 0.0
-        return
-    for i in range(3):
-        q[i] /= travel
+        q[i] = q[i] / travel if travel > 0.0 else 0.0
 
 
 @compiled

@@ -88,7 +88,7 @@ class SettledContact(CompiledModel):
     stiffness: float = FOUNDATION_STIFFNESS
     margin_cap: float = MARGIN_CAP
     name: ClassVar[str] = "settled"
-    version: ClassVar[str] = "4"
+    version: ClassVar[str] = "5"
 
     def __post_init__(self) -> None:
         positive(self.friction, "friction", zero_allowed=True)

@@ -158,7 +158,7 @@ def test_jaws_off_center_along_the_closing_axis_bring_the_part_to_the_middle(par
         shifted = judged(part, from_above(x=x), friction=0.3)
         assert shifted.settlement.pushed == pytest.approx(abs(x), abs=1e-4)
         assert shifted.settlement.path[-1][0, 3] == pytest.approx(x, abs=1e-4)
-        assert shifted.settlement.yaw == pytest.approx(reference.settlement.yaw, abs=5e-3)
+        assert shifted.settlement.yaw == pytest.approx(reference.settlement.yaw, abs=1e-2)
         assert shifted.margin == pytest.approx(reference.margin, rel=1e-2)
         assert "touches first" in shifted.explanation
 
@@ -219,7 +219,7 @@ def test_the_lift_adds_the_weight():
 def test_a_jammed_part_hangs_but_is_not_said_to_carry_so_much_more():
     """A steep wedge caught by its corner: out of balance, and yet stuck."""
     verdict = judged(
-        wedge(np.radians(6)), from_above(np.radians(45), y=0.014, z=0.012), friction=0.8
+        wedge(np.radians(6)), from_above(np.radians(30), y=0.01, z=0.012), friction=0.8
     )
     assert verdict.settlement.fate is Fate.JAMMED
     assert verdict.resists and verdict.margin == 1.0 and verdict.reason is Reason.HOLDS
@@ -279,7 +279,18 @@ def test_without_friction_the_potential_never_rises_while_settling(case):
 
 def test_a_pad_that_presses_on_nothing_pushes_nothing():
     motions = motions_on_table(np.array([0.0, 0.0, 1.0]), np.array([1.0, 0.0, 0.0]))
-    hand = Hand(np.zeros(3), 0.2, 0.4, FOUNDATION_STIFFNESS, 0.03)
     motion = np.full(3, np.nan)
-    pushed_twist(motions, np.zeros(6), np.zeros(3), np.eye(4), hand, 0.01, motion, 1.0)
+    pushed_twist(motions, np.zeros(6), 3.0, 1.0, motion)
     np.testing.assert_array_equal(motion, 0.0)
+
+
+def test_friction_of_the_pad_does_not_drag_a_part_that_is_pushed_aside():
+    """Knocked at a lever, a cube turns; its center keeps its place across the closing axis."""
+    verdicts = [judged(cube(), from_above(x=0.008, y=0.017), friction=mu) for mu in (0.0, 0.4)]
+    for verdict in verdicts:
+        path = verdict.settlement.path
+        pushed = path[1 : verdict.settlement.rest + 1]
+        assert len(pushed) > 3
+        turned = np.arctan2(path[4][1, 0], path[4][0, 0])
+        assert abs(turned) > np.radians(2) and abs(path[4][1, 3]) < 0.1 * abs(path[4][0, 3])
+    np.testing.assert_allclose(verdicts[0].settlement.path[4], verdicts[1].settlement.path[4])
