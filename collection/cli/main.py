@@ -35,6 +35,7 @@ COMMANDS: dict[str, str] = {
 """Command name -> module in collection.cli that holds a function of the same name."""
 
 
+INTERRUPTED = 130
 _SYSTEM_LIBRARY = re.compile(r"(lib[\w.+-]+): cannot open shared object file")
 
 
@@ -126,7 +127,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
         given = sys.argv[1:] if arguments is None else arguments
         return _complain(_naming_the_value(error.format_message(), given), 2)
     except (typer.Abort, KeyboardInterrupt):
-        return _complain("interrupted", 130)
+        return _complain("interrupted", INTERRUPTED)
+    if result == INTERRUPTED:  # the parser swallows a Ctrl-C in a command, and says nothing
+        return _complain("interrupted", INTERRUPTED)
     return result if isinstance(result, int) else 0
 
 

@@ -147,6 +147,15 @@ def test_version_is_printed(capsys):
     assert capsys.readouterr().out.startswith(f"reach-trials {metadata.version('reach-trials')}")
 
 
+def test_an_interrupted_command_says_so(capsys, monkeypatch):
+    def interrupted(*_, **__):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("collection.objects.load_objects", interrupted)
+    assert main(["objects"]) == 130
+    assert capsys.readouterr().err == "error: interrupted\n"
+
+
 @pytest.mark.parametrize("words", ["--help", "collect --help", "objects", "objects --json"])
 def test_a_reader_who_has_seen_enough_is_no_fault(words):
     reading, writing = os.pipe()
