@@ -12,7 +12,7 @@ def test_a_subset_is_worth_less_the_closer_its_points_lie():
     assert _effective(1500, 12_000, 1.0) == pytest.approx(1500)
     assert _effective(1500, 1500, 5.0) == pytest.approx(300)  # all points: total over area
     assert _effective(1500, 1_500_000, 5.0) == pytest.approx(1500, rel=0.01)  # far apart
-    assert 300 < _effective(1500, 12_000, 5.0) < 1500
+    assert _effective(1500, 6000, 5.0) == pytest.approx(1200)
 
 
 def test_depths_of_slanted_faces_are_known_as_well_as_they_scatter():
