@@ -16,9 +16,11 @@ from registration.frame import DepthFrame
 from registration.mesh_model import mesh_model
 from registration.observation import Scan, scan
 from registration.options import RegistrationOptions
-from registration.polish import PRINT_ERROR
 from registration.search import Hypothesis, Search
 from registration.table import fit_table
+
+FACE_ERROR = 3e-5
+"""Standard deviation of a printed face against its mesh, as a whole [m]."""
 
 
 class Job:
@@ -109,7 +111,7 @@ class Job:
                 search.seen,
                 tolerance=search.fine_tolerance,
                 noise=search.depth_noise,
-                bias=float(np.hypot(self.profile.bias, PRINT_ERROR)),
+                bias=float(np.hypot(self.profile.bias, FACE_ERROR)),
             )
         return weigher.weigh(
             first.T_camera_object, np.stack([other.T_camera_object for other in others])

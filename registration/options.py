@@ -34,7 +34,7 @@ class SensorProfile:
 
 
 PROFILES = {
-    "structured-light": SensorProfile((1e-4, 6e-4), 0.8e-3, 3e-3, 0.25, 0.05, 2e-5),
+    "structured-light": SensorProfile((1e-4, 6e-4), 0.8e-3, 3e-3, 0.25, 0.05, 1e-5),
     "stereo": SensorProfile((4e-4, 3e-3), 3e-3, 5e-3, 0.35, 0.05, 1e-4),
 }
 """By `DepthFrame.sensor`."""
