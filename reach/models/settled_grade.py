@@ -78,4 +78,4 @@ def quantities(gripper: ParallelJawGripper, told: Settled) -> FloatArray:
     return np.array([1.0, log_odds, inside.mean()])
 
 
-GRADE = Grade(offset=-1.07, share=0.79, inside=4.83, alike=7.2)
+GRADE = Grade(offset=-1.07, share=0.79, inside=4.83, alike=3.0)
