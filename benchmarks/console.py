@@ -26,12 +26,12 @@ from typing import Any
 
 import numpy as np
 
-from labeling.access import make_access
-from labeling.commands import Actor
-from labeling.console import Console
-from labeling.controller import SessionController
+from labeling.control.commands import Actor
+from labeling.control.controller import SessionController
+from labeling.display.console import Console
 from labeling.errors import SessionEndingError
-from labeling.server import ConsoleServer, free_port
+from labeling.server.access import make_access
+from labeling.server.server import ConsoleServer, free_port
 from logs.journal.events import Noted, Phase, Scored, SensorVerdict, Source
 from logs.journal.state import PlannedEntry, SessionState
 from logs.session.folder import SessionDescriptor, SessionFolder, open_segment

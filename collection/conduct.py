@@ -24,7 +24,7 @@ from reach.errors import ReachError
 
 if TYPE_CHECKING:
     from collection.station.station import Station
-    from labeling.controller import SessionController
+    from labeling.control.controller import SessionController
     from logs.session.mirrored_journal import MirroredJournal
 
 
@@ -72,7 +72,7 @@ def _run(
     asked: Conduct, folder: SessionFolder, setup: Setup, station: Station, terminal: Console
 ) -> None:
     from collection.session.ending import stop_station
-    from labeling.controller import SessionController
+    from labeling.control.controller import SessionController
     from logs.disk import trials_left
     from logs.session.mirror import AnnotationMirror
     from logs.session.mirrored_journal import MirroredJournal

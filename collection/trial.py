@@ -37,7 +37,7 @@ if TYPE_CHECKING:
     from collection.plan.records import Plan, PlannedGrasp, PlannedPose, PlannedTrial
     from collection.robots.protocol import Arm
     from collection.station.station import Station
-    from labeling.take import Take
+    from labeling.control.take import Take
     from reach.objects import GraspObject
     from registration.frame import DepthFrame
 

@@ -8,11 +8,11 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Final
 
-from labeling.commands import Actor
-from labeling.console import Console
-from labeling.controller import SessionController
+from labeling.control.commands import Actor
+from labeling.control.controller import SessionController
+from labeling.control.take import Take
+from labeling.display.console import Console
 from labeling.errors import SessionEndingError, TakeEndedError
-from labeling.take import Take
 from logs.errors import JournalWriteError
 from logs.journal.events import AnyEvent, Entry, Phase, SensorVerdict
 from logs.journal.state import PlannedEntry, SessionState

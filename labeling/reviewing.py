@@ -6,9 +6,9 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-from labeling.commands import Actor
-from labeling.console import Console
-from labeling.controller import SessionController
+from labeling.control.commands import Actor
+from labeling.control.controller import SessionController
+from labeling.display.console import Console
 from logs.errors import LogError
 from logs.journal.state import SessionState, TrialState
 from logs.session.folder import SessionFolder

@@ -20,13 +20,13 @@ def console(
     """
     from collection.errors import OptionsError
     from collection.session.terminal_operator import has_terminal
-    from labeling.terminal_link import TerminalLink, check_link, trusted
+    from labeling.terminal.link import TerminalLink, check_link, trusted
 
     verify = trusted(certificate)
     check_link(link, verify=verify)
     if not has_terminal():
         raise OptionsError("reach console needs a terminal, and this process has none")
 
-    from labeling.terminal import TerminalConsole
+    from labeling.terminal.app import TerminalConsole
 
     TerminalConsole(TerminalLink(link, verify=verify)).run()

@@ -13,8 +13,8 @@ import typer
 from collection.cli.console_options import LOOPBACK, Certificate, Host, Key, Name, Port, Token
 
 if TYPE_CHECKING:
-    from labeling.commands import Actor
-    from labeling.console import Console
+    from labeling.control.commands import Actor
+    from labeling.display.console import Console
 
 
 def label(
@@ -49,7 +49,7 @@ def label(
     - `reach label --practice`
     """
     from collection.session.options import Sitting
-    from labeling.server import ConsoleServer
+    from labeling.server.server import ConsoleServer
     from reach.errors import InvalidInputError
 
     if practice == (session is not None):

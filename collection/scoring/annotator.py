@@ -27,7 +27,7 @@ from reach.sources import source_digest
 
 if TYPE_CHECKING:
     from collection.scoring.predictions import Prediction
-    from labeling.controller import SessionController
+    from labeling.control.controller import SessionController
     from logs.journal.state import TakeState
     from logs.session.folder import SessionFolder
     from logs.session.mirrored_journal import MirroredJournal

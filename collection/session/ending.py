@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from collection.station.station import Station
-    from labeling.controller import SessionController
+    from labeling.control.controller import SessionController
 
 
 ENDING = (signal.SIGTERM, signal.SIGINT, signal.SIGHUP)

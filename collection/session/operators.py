@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from collection.session.options import Sitting
     from collection.session.setup import Setup
     from collection.station.station import Station
-    from labeling.controller import SessionController
+    from labeling.control.controller import SessionController
     from logs.journal.state import TakeState, TrialState
     from logs.session.folder import SessionFolder
     from reach.objects import GraspObject
@@ -32,7 +32,7 @@ def simulated_operator(
     controller: SessionController, station: Station, setup: Setup
 ) -> Iterator[None]:
     """The operator of `--operator auto`, who sees what a person would see: the true object."""
-    from labeling.auto import AutoOperator
+    from labeling.control.auto import AutoOperator
 
     def choose_pose(trial: TrialState, take: TakeState) -> int:
         return _nearest_pose(station, setup, trial, take)
@@ -74,7 +74,7 @@ class WebConsole:
         *,
         simulated: bool,
     ) -> None:
-        from labeling.pictures import PictureShelf
+        from labeling.display.pictures import PictureShelf
 
         self._controller = controller
         self._setup = setup
@@ -87,9 +87,9 @@ class WebConsole:
     @contextmanager
     def serve(self) -> Iterator[str]:
         """Serve the page; yields the link that opens it."""
-        from labeling.console import Console
+        from labeling.display.console import Console
         from labeling.reviewing import blind_recording
-        from labeling.server import ConsoleServer
+        from labeling.server.server import ConsoleServer
 
         console = Console(
             self._controller,

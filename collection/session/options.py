@@ -12,8 +12,8 @@ from pydantic import BaseModel, ConfigDict, Field, field_validator
 from reach.models.names import ANALYTIC_NAMES, MODEL_NAMES
 
 if TYPE_CHECKING:
-    from labeling.access import Access
-    from labeling.commands import Actor
+    from labeling.control.commands import Actor
+    from labeling.server.access import Access
 
 OperatorKind = Literal["auto", "web", "terminal"]
 
@@ -85,7 +85,7 @@ class Sitting:
 
     def actor(self) -> Actor:
         """The person, as the console knows them."""
-        from labeling.commands import Actor
+        from labeling.control.commands import Actor
         from logs.journal.events import Source
 
         return Actor(self.person, Source.OPERATOR)
@@ -96,8 +96,8 @@ class Sitting:
         Raises:
             UnsafeAddressError: others could reach it without a token and TLS.
         """
-        from labeling.access import make_access
-        from labeling.server import free_port
+        from labeling.server.access import make_access
+        from labeling.server.server import free_port
 
         return make_access(
             self.host,

@@ -11,7 +11,7 @@ from typing import Self
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn
 
-from labeling.controller import SessionController
+from labeling.control.controller import SessionController
 from logs.journal.events import Outcome
 
 

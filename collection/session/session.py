@@ -21,8 +21,8 @@ from collection.errors import (
 )
 from collection.session.recorded_time import last_recorded_ns
 from collection.trial import TrialContext, run_take
-from labeling.auto import ACTOR
-from labeling.commands import AnswerStatus, Command, CommandKind
+from labeling.control.auto import ACTOR
+from labeling.control.commands import AnswerStatus, Command, CommandKind
 from labeling.errors import SessionEndingError, TakeEndedError
 from logs.journal.events import Paused
 from logs.journal.state import STATION_HOLD
@@ -32,8 +32,8 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from collection.scoring.annotator import Annotator
-    from labeling.controller import SessionController
-    from labeling.take import Take
+    from labeling.control.controller import SessionController
+    from labeling.control.take import Take
     from logs.journal.state import TrialState
 
 

@@ -13,11 +13,11 @@ from collections import deque
 from collections.abc import Callable
 from typing import TYPE_CHECKING
 
-from labeling.commands import Actor, Command, CommandKind
+from labeling.control.commands import Actor, Command, CommandKind
 
 if TYPE_CHECKING:
     from collection.session.progress import SessionProgress
-    from labeling.controller import SessionController
+    from labeling.control.controller import SessionController
 
 LOOK_PERIOD = 0.2
 """Seconds between looks at whether the session has ended, while the console is closed."""
@@ -84,8 +84,8 @@ class TerminalOperator:
 
     def _show(self, session: threading.Thread) -> None:
         """The console, until its operator quits or the session is over."""
-        from labeling.terminal import TerminalConsole
-        from labeling.terminal_link import TerminalLink
+        from labeling.terminal.app import TerminalConsole
+        from labeling.terminal.link import TerminalLink
 
         with self._progress.elsewhere(self._lines.append):
             TerminalConsole(

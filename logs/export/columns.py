@@ -263,7 +263,7 @@ def trial_of_row(row: dict[str, Any], models: Iterable[str]) -> LabeledTrial:
     execution = Execution(
         T_world_object=_matrix(row["T_world_object_registered"], 4),
         covariance=_matrix(row["registration_covariance"], 6),
-        covariance_in_hand=_matrix(row.get("object_in_hand_covariance"), 6),  # not in the first sets
+        covariance_in_hand=_matrix(row.get("object_in_hand_covariance"), 6),  # younger than v1
         T_world_gripper=_matrix(row["T_world_gripper_executed"], 4),
         T_object_gripper=_matrix(row["T_object_gripper_executed"], 4),
         jaw_width=row["jaw_width"],

@@ -13,8 +13,8 @@ from collection import trial as trial_module
 from collection.cli.main import main
 from collection.robots.simulated_arm import SimulatedArm
 from collection.session.session import Session
-from labeling.commands import Actor, Command, CommandKind
-from labeling.controller import SessionController
+from labeling.control.commands import Actor, Command, CommandKind
+from labeling.control.controller import SessionController
 from logs.journal.events import Source
 from logs.session.folder import SessionFolder
 from registration.errors import NoGoodPoseError

@@ -13,13 +13,13 @@ from typing import Any
 import httpx
 import pytest
 
-from labeling.access import make_access
-from labeling.commands import Actor, Answer, Command, CommandKind
-from labeling.console import Console
-from labeling.controller import SessionController
-from labeling.pictures import PictureShelf
-from labeling.server import ConsoleServer, free_port
-from labeling.take import Take
+from labeling.control.commands import Actor, Answer, Command, CommandKind
+from labeling.control.controller import SessionController
+from labeling.control.take import Take
+from labeling.display.console import Console
+from labeling.display.pictures import PictureShelf
+from labeling.server.access import make_access
+from labeling.server.server import ConsoleServer, free_port
 from logs.journal.events import Phase, Scored, SensorVerdict, Source
 from logs.journal.state import PlannedEntry, SessionState, TrialState
 from logs.session.folder import SessionDescriptor, SessionFolder, open_segment

@@ -10,10 +10,10 @@ import sys
 import time
 from pathlib import Path
 
-from labeling.auto import AutoOperator
-from labeling.controller import SessionController
+from labeling.control.auto import AutoOperator
+from labeling.control.controller import SessionController
+from labeling.control.take import Take
 from labeling.errors import SessionEndingError, TakeEndedError
-from labeling.take import Take
 from logs.journal.events import (
     FailureReason,
     Outcome,

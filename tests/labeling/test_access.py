@@ -9,13 +9,13 @@ from typing import Any
 import httpx
 import pytest
 
-from labeling.access import make_access
-from labeling.commands import Actor
-from labeling.console import Console
+from labeling.control.commands import Actor
+from labeling.display.console import Console
+from labeling.display.pictures import PictureShelf
 from labeling.errors import OutsideSessionError, UnsafeAddressError
-from labeling.pictures import PictureShelf
-from labeling.recordings import TICKET_SECONDS, RecordingTickets
-from labeling.server import ConsoleServer, free_port
+from labeling.server.access import make_access
+from labeling.server.recordings import TICKET_SECONDS, RecordingTickets
+from labeling.server.server import ConsoleServer, free_port
 from logs.journal.events import Source
 
 PNG = b"\x89PNG\r\n\x1a\n"

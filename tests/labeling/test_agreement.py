@@ -15,7 +15,7 @@ from labeling.agreement import (
     kappa_interval,
     operator_agreement,
 )
-from labeling.commands import Actor
+from labeling.control.commands import Actor
 from logs.journal.events import Source
 from logs.journal.state import SessionState
 

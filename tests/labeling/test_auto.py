@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 
-from labeling.auto import AutoOperator
+from labeling.control.auto import AutoOperator
 from labeling.errors import SessionEndingError
 from logs.journal.events import Phase, SensorVerdict
 from logs.journal.file import read_journal

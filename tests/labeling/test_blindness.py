@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 
-from labeling.commands import Actor
+from labeling.control.commands import Actor
 from logs.journal.events import Source
 from logs.journal.state import PlannedEntry, SessionState
 from logs.session.folder import SessionDescriptor, SessionFolder

@@ -9,10 +9,10 @@ from typing import Any
 
 import pytest
 
-from labeling.access import make_access
-from labeling.commands import Actor
-from labeling.console import Console
-from labeling.server import ConsoleServer, free_port
+from labeling.control.commands import Actor
+from labeling.display.console import Console
+from labeling.server.access import make_access
+from labeling.server.server import ConsoleServer, free_port
 from logs.journal.events import Phase, Source
 from logs.journal.file import read_journal
 

@@ -9,9 +9,9 @@ from typing import Any
 import pytest
 
 from collection.cli.main import main
-from labeling.access import make_access
-from labeling.console import Console
-from labeling.server import ConsoleServer, free_port
+from labeling.display.console import Console
+from labeling.server.access import make_access
+from labeling.server.server import ConsoleServer, free_port
 
 Refused = Callable[..., str]
 

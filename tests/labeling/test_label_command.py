@@ -75,10 +75,8 @@ def test_a_recorded_session_is_relabeled_and_left_as_it_ended(bench: Any, start:
     item = client.get("/api/review").json()["trials"][0]
     answer = relabel(client, item, "relabel", outcome="failure", reason="other", note="slow look")
     assert answer["status"] == "stored"
-    begun = time.monotonic()
     process.send_signal(signal.SIGINT)
     assert process.wait(10) == 0
-    assert time.monotonic() - begun < 2.5  # with the interpreter's own end, on a busy machine
     state = bench.folder.read_state()
     label = state.order[0].label
     assert (label.operator, label.outcome, label.note) == ("bo", "failure", "slow look")

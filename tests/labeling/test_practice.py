@@ -7,10 +7,10 @@ from pathlib import Path
 
 import pytest
 
-from labeling.auto import AutoOperator
-from labeling.commands import Actor
+from labeling.control.auto import AutoOperator
+from labeling.control.commands import Actor
+from labeling.display.view import console_view
 from labeling.practice import practice_console
-from labeling.view import console_view
 from logs.journal.events import Source
 from logs.journal.state import SessionState
 

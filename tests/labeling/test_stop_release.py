@@ -5,8 +5,8 @@ from __future__ import annotations
 import threading
 from typing import Any
 
-from labeling.commands import Actor
-from labeling.stop_count import StopCount
+from labeling.control.commands import Actor
+from labeling.control.stop_count import StopCount
 from logs.journal.events import Source
 
 ANN = Actor("ann", Source.OPERATOR)

@@ -9,8 +9,8 @@ from typing import Any
 import pytest
 
 from labeling.errors import LabelingError
-from labeling.terminal import TerminalConsole
-from labeling.terminal_link import TerminalLink
+from labeling.terminal.app import TerminalConsole
+from labeling.terminal.link import TerminalLink
 
 Steps = Callable[[TerminalConsole, Any], Awaitable[None]]
 

@@ -13,8 +13,8 @@ from textual.app import App, ComposeResult
 from textual.containers import Horizontal, Vertical
 from textual.widgets import Input, Static
 
-from labeling.terminal_link import TerminalLink
-from labeling.terminal_text import banner, choices_text, counters, history, legend, trial_text
+from labeling.terminal.link import TerminalLink
+from labeling.terminal.text import banner, choices_text, counters, history, legend, trial_text
 
 ALIVE_PERIOD: Final = 1.5
 RETRY_SECONDS: Final = 0.4

@@ -7,10 +7,10 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Final, Literal
 
-from labeling.commands import Actor, Answer, Command, CommandKind
-from labeling.controller import SessionController
-from labeling.judging import rejection
-from labeling.pictures import PictureShelf
+from labeling.control.commands import Actor, Answer, Command, CommandKind
+from labeling.control.controller import SessionController
+from labeling.control.judging import rejection
+from labeling.display.pictures import PictureShelf
 from logs.journal.state import TrialState
 
 Recordings = Callable[[TrialState], Path | None]

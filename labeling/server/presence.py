@@ -6,7 +6,7 @@ import asyncio
 from collections.abc import Callable
 from typing import Final
 
-from labeling.controller import SessionController, uptime
+from labeling.control.controller import SessionController, uptime
 from logs.errors import JournalWriteError
 
 CAUSE: Final = "console"

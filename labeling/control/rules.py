@@ -8,8 +8,8 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Final, cast
 
-from labeling import commands as cm
-from labeling.commands import Actor, Command, CommandKind, Value
+from labeling.control import commands as cm
+from labeling.control.commands import Actor, Command, CommandKind, Value
 from labeling.errors import LabelingError
 from logs.journal import events as ev
 from logs.journal.events import AnyEvent, Phase

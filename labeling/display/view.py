@@ -6,7 +6,7 @@ import time
 from dataclasses import asdict
 from typing import Any, Final
 
-from labeling.console import Console, no_recording
+from labeling.display.console import Console, no_recording
 from labeling.taxonomy import CAUSE_TEXT, KEYS, REASON_TEXT, RULE
 from logs.journal.events import LabelEvent, Outcome, Phase
 from logs.journal.state import SessionState, TakeState, TrialState

@@ -18,7 +18,7 @@ from logs.journal.events import LabelEvent, Phase, SensorVerdict
 from logs.journal.state import TakeState, TrialState
 
 if TYPE_CHECKING:
-    from labeling.controller import SessionController
+    from labeling.control.controller import SessionController
 
 STOPPED: Final = "software stop"
 
@@ -32,7 +32,7 @@ class Decision:
 
 
 class Take:
-    """A take under way; made by [begin][labeling.controller.SessionController.begin].
+    """A take under way; made by [begin][labeling.control.controller.SessionController.begin].
 
     Args:
         controller: the session's controller.
@@ -93,10 +93,10 @@ class Take:
 
         Returns:
             0 for the best pose, 1, 2, ... for its rivals, None if the object is to be put down
-            again: then go back to [wait_placed][labeling.take.Take.wait_placed].
+            again: then go back to [wait_placed][labeling.control.take.Take.wait_placed].
 
         Raises:
-            TakeEndedError: as for [advance][labeling.take.Take.advance].
+            TakeEndedError: as for [advance][labeling.control.take.Take.advance].
             SessionEndingError: if the session is to end.
         """
         self.advance(Phase.CONFIRM_POSE, info)

@@ -8,8 +8,8 @@ from collections.abc import AsyncIterator
 from contextlib import suppress
 from typing import Final
 
-from labeling.console import Console
-from labeling.view import console_view
+from labeling.display.console import Console
+from labeling.display.view import console_view
 
 TICK_PERIOD: Final = 0.5
 """Seconds between ticks; a console that misses several shows red and sends nothing."""

@@ -12,13 +12,13 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import Literal, Protocol
 
-from labeling.changes import Changes
-from labeling.commands import Actor, Answer, AnswerStatus, Command, CommandKind
-from labeling.disk_guard import DiskGuard
+from labeling.control.changes import Changes
+from labeling.control.commands import Actor, Answer, AnswerStatus, Command, CommandKind
+from labeling.control.disk_guard import DiskGuard
+from labeling.control.judging import judge, rejection, revision
+from labeling.control.stop_count import StopCount
+from labeling.control.take import Take
 from labeling.errors import SessionEndingError
-from labeling.judging import judge, rejection, revision
-from labeling.stop_count import StopCount
-from labeling.take import Take
 from logs.errors import JournalWriteError
 from logs.journal import events as ev
 from logs.journal.events import AnyEvent, Entry

@@ -12,16 +12,16 @@ from typing import Annotated, Any, Final
 from fastapi import APIRouter, Body, FastAPI, HTTPException, Query, Request
 from fastapi.responses import FileResponse, Response, StreamingResponse
 
-from labeling.access import Access, Gate
-from labeling.commands import Answer, Command, CommandKind
-from labeling.console import Console
+from labeling.control.commands import Answer, Command, CommandKind
+from labeling.display.console import Console
+from labeling.display.review import Filter, models_scored, review_list
+from labeling.display.view import View, console_terms, console_view
 from labeling.errors import OutsideSessionError
-from labeling.presence import Presence
-from labeling.recordings import RecordingTickets
-from labeling.review import Filter, models_scored, review_list
-from labeling.stream import Streams, console_stream
-from labeling.view import View, console_terms, console_view
-from labeling.viewer_assets import ASSETS, ViewerAssetsError, viewer_asset
+from labeling.server.access import Access, Gate
+from labeling.server.presence import Presence
+from labeling.server.recordings import RecordingTickets
+from labeling.server.stream import Streams, console_stream
+from labeling.server.viewer_assets import ASSETS, ViewerAssetsError, viewer_asset
 
 PAGES: Final = {
     "/": ("index.html", "text/html"),

@@ -11,10 +11,10 @@ from typing import Final, Self
 
 import uvicorn
 
-from labeling.access import Access
-from labeling.api import ConsoleApi
-from labeling.console import Console
+from labeling.display.console import Console
 from labeling.errors import LabelingError
+from labeling.server.access import Access
+from labeling.server.api import ConsoleApi
 
 START_SECONDS: Final = 15.0
 
@@ -24,7 +24,7 @@ class ConsoleServer:
 
     Args:
         console: the session and what may be shown of it.
-        access: where to listen; port 0 is not allowed, see [free_port][labeling.server.free_port].
+        access: where to listen; port 0 is not allowed, see [free_port][labeling.server.server.free_port].
 
     Raises:
         LabelingError: on entering, if the server does not start.

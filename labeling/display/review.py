@@ -6,7 +6,7 @@ from typing import Final
 
 from pydantic import BaseModel, ConfigDict
 
-from labeling.view import View, label_view, to_judge, trial_view
+from labeling.display.view import View, label_view, to_judge, trial_view
 from logs.journal.events import LabelEvent, Outcome
 from logs.journal.state import SessionState, TakeState, TrialState
 

@@ -13,8 +13,8 @@ from typing import Final, Self
 
 from pydantic import JsonValue
 
-from labeling.commands import Actor, Command, CommandKind
-from labeling.controller import SessionController
+from labeling.control.commands import Actor, Command, CommandKind
+from labeling.control.controller import SessionController
 from logs.journal.events import Phase, Source
 from logs.journal.state import SessionState, TakeState, TrialState
 

@@ -9,7 +9,7 @@ from typing import Final
 
 from pydantic import ValidationError
 
-from labeling.commands import (
+from labeling.control.commands import (
     VALUE_MODELS,
     Actor,
     Answer,
@@ -18,7 +18,7 @@ from labeling.commands import (
     CommandKind,
     Value,
 )
-from labeling.rules import NEEDS_REVISION, TRIAL_KINDS, RefusedError, event_of
+from labeling.control.rules import NEEDS_REVISION, TRIAL_KINDS, RefusedError, event_of
 from logs.journal.events import AnyEvent
 from logs.journal.state import SessionState
 

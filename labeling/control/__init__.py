@@ -1,0 +1,1 @@
+"""The session's one writer: commands in, events out, and the loop it leads."""

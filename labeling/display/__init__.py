@@ -1,0 +1,1 @@
+"""What a console is given to show: the session's state, lists and pictures, as plain values."""

@@ -1,0 +1,1 @@
+"""The terminal console: the page's keys over SSH, and when no browser is at hand."""
