@@ -114,12 +114,13 @@ def _serve(shown: Sequence[Path]) -> None:
     """Serve recordings to a browser until Ctrl-C, or until the SSH session is closed."""
     import os
     import signal
+    from contextlib import suppress
 
     from logs.view.viewer import WebViewer
 
     for ending in (signal.SIGTERM, signal.SIGHUP):
         signal.signal(ending, signal.default_int_handler)  # so that the server ends with us
-    with WebViewer(shown) as viewer:
+    with suppress(KeyboardInterrupt), WebViewer(shown) as viewer:
         address = viewer.address
         print(f"open {address.link}")
         print(f"from another machine, first: {address.tunnel(os.environ)}")

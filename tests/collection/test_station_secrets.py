@@ -37,7 +37,7 @@ def test_no_byte_of_a_session_holds_the_password(tmp_path: Path, way: str) -> No
     station = station_of(WAYS[way], tmp_path)
     assert isinstance(station.config.robot, YumiConfig)
     assert station.config.robot.password.get_secret_value() == SECRET
-    parts = load_objects(("cube_3cm",), None)
+    parts = load_objects(("cube_3cm",))
     plan = make_plan(parts, station.gripper.geometry, grasps=1, repeats=1, seed=1)
     options = SessionOptions(objects=("cube_3cm",), station="lab.toml", operator="web")
     setup = Setup(options, station.text, {part.name: part for part in parts}, plan)
