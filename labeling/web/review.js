@@ -13,7 +13,7 @@ export class Review {
     this.foundBy = null;
     this.version = -1;
     this.asked = 0; // the newest question to the server: an older answer is old news
-    this.came = { trial: null, at: 0 }; // what is on the stage, and since when
+    this.came = { trial: null, at: -Infinity }; // what is on the stage, and since when
     byId("filter").addEventListener("change", (event) => {
       if (event.target instanceof HTMLSelectElement) event.target.blur(); // else it keeps the keys
       this.place = 0;

@@ -172,7 +172,10 @@ def test_space_on_a_button_that_was_clicked_is_no_second_label(bench: Any, await
     awaiting.element("do-success").click()
     awaiting.receipt("stored")
     bench.executed()
-    awaiting.wait("return document.getElementById('trial-number').textContent === '2'")
+    awaiting.wait(
+        "return document.getElementById('trial-number').textContent === '2'"
+        " && document.body.dataset.state === 'AWAITING_LABEL'"
+    )
     awaiting.run("document.getElementById('do-success').focus()")
     awaiting.press(" ")
     awaiting.press("\ue007")
