@@ -69,19 +69,29 @@ class TerminalConsole(App[None]):
         self._about_take: tuple[str | None, int | None] = (None, None)
         self._pending: Command | None = None
         self._note = ""
+        # Held, not looked up: a view may still arrive while the screen is being taken down.
+        self._banner = Static("", id="banner")
+        self._counters = Static("", id="counters")
+        self._trial = Static("", id="trial")
+        self._history = Static("", id="history")
+        self._newest_lines = Static("", id="lines")
+        self._choices = Static("", id="choices")
+        self._receipt = Static("", id="receipt")
+        self._note_field = Input(placeholder="note (n); Enter leaves the field", id="note")
+        self._legend = Static("", id="legend")
 
     def compose(self) -> ComposeResult:
         """Lay the console out."""
-        yield Static("", id="banner")
-        yield Static("", id="counters")
+        yield self._banner
+        yield self._counters
         with Horizontal(id="body"):
-            yield Vertical(Static("", id="trial"))
-            yield Vertical(Static("", id="history"))
-        yield Static("", id="lines")
-        yield Static("", id="choices")
-        yield Static("", id="receipt")
-        yield Input(placeholder="note (n); Enter leaves the field", id="note")
-        yield Static("", id="legend")
+            yield Vertical(self._trial)
+            yield Vertical(self._history)
+        yield self._newest_lines
+        yield self._choices
+        yield self._receipt
+        yield self._note_field
+        yield self._legend
 
     def on_mount(self) -> None:
         """Start to follow the server."""
@@ -164,7 +174,7 @@ class TerminalConsole(App[None]):
                 kind = "resume" if self._view["paused"] else "pause"
                 await self._send({"kind": kind, "rev": self._view["control_rev"]}, f"{kind}d")
             case "note":
-                self.query_one("#note", Input).focus()
+                self._note_field.focus()
 
     def offered(self) -> list[tuple[str, str]]:
         """What the digits choose among now: value and words."""
@@ -266,7 +276,7 @@ class TerminalConsole(App[None]):
             return
         if command["kind"] in ("label", "relabel", "redo", "skip"):
             self._rotated, self._relabel, self._note = False, None, ""
-            self.query_one("#note", Input).value = ""
+            self._note_field.value = ""
         if command["kind"] == "undo":
             self._relabel = command["trial_id"]
         self._tell("stored", answer.get("message") or f"stored: {said}")
@@ -301,9 +311,8 @@ class TerminalConsole(App[None]):
         self._tell("refused", message)
 
     def _tell(self, kind: str, message: str) -> None:
-        receipt = self.query_one("#receipt", Static)
-        receipt.set_classes(kind)
-        receipt.update(message)
+        self._receipt.set_classes(kind)
+        self._receipt.update(message)
         self.draw()
 
     def draw(self) -> None:
@@ -311,18 +320,17 @@ class TerminalConsole(App[None]):
         if self._over():
             self.exit()
         newest = list(self._lines)[-SHOWN_LINES:]
-        self.query_one("#lines", Static).update(Text("\n".join(newest)))
+        self._newest_lines.update(Text("\n".join(newest)))
         view, alive = self._view, self._link.alive
         state = view["state"] if view and (alive or view["state"] == "ENDED") else "LOST"
-        shown = self.query_one("#banner", Static)
-        shown.set_classes(state)
+        self._banner.set_classes(state)
         target = self._target()
         again = target if target and target["kind"] == "relabel" and state != "STOPPED" else None
-        shown.update(banner(state, view, again))
-        self.query_one("#legend", Static).update(legend(self._terms))
-        self.query_one("#choices", Static).update(choices_text(self.offered()))
+        self._banner.update(banner(state, view, again))
+        self._legend.update(legend(self._terms))
+        self._choices.update(choices_text(self.offered()))
         if view is None:
             return
-        self.query_one("#counters", Static).update(counters(view, alive=alive))
-        self.query_one("#trial", Static).update(trial_text(view, rotated=self._rotated))
-        self.query_one("#history", Static).update(history(view, self._relabel))
+        self._counters.update(counters(view, alive=alive))
+        self._trial.update(trial_text(view, rotated=self._rotated))
+        self._history.update(history(view, self._relabel))

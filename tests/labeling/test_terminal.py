@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import contextvars
 from collections.abc import Awaitable, Callable
 from typing import Any
 
@@ -111,6 +112,26 @@ def test_a_lost_connection_shows_and_sends_nothing(bench: Any, serve: Any) -> No
     bench.executed()
     operate(server.link, steps)
     assert bench.trial(1).label is None
+
+
+def test_a_view_that_arrives_while_the_screen_is_taken_down_harms_nothing(
+    bench: Any, serve: Any
+) -> None:
+    bench.executed()
+    link = serve(bench).link
+
+    async def run() -> None:
+        app = TerminalConsole(TerminalLink(link))
+        async with app.run_test(size=(120, 40)):
+            await until(app, lambda: bool(app._view and app._terms))
+            await app.screen.query("*").remove()
+            app._take_in(dict(app._view or {}))
+            await app._act("s")
+            context = contextvars.copy_context()
+        context.run(app._take_in, dict(app._view or {}))  # as the worker would, a moment too late
+
+    asyncio.run(run())
+    assert bench.trial(1).label is not None
 
 
 def test_no_prediction_before_the_label(bench: Any, serve: Any) -> None:
