@@ -1,4 +1,4 @@
-"""Forward kinematics and Jacobians of a serial arm, for many configurations at once."""
+"""Forward kinematics of a serial arm, for many configurations at once."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from collection.robots.chain_kernels import fill_all_frames
 from reach.arrays import FloatArray, frozen
 from reach.transforms import make_transform, rotation_about
 
@@ -41,35 +42,15 @@ class SerialChain:
         Args:
             joints: shape (..., J) [rad].
         """
-        cosine, sine = np.cos(joints), np.sin(joints)
-        frames = np.empty((*joints.shape[:-1], len(self) + 1, 4, 4))
-        T = np.broadcast_to(np.eye(4), (*joints.shape[:-1], 4, 4))
-        for number in range(len(self)):
-            fixed = T @ self.T_parent_joint[number]
-            c, s = cosine[..., number, None], sine[..., number, None]
-            T = fixed.copy()  # times a rotation about z
-            T[..., :, 0] = fixed[..., :, 0] * c + fixed[..., :, 1] * s
-            T[..., :, 1] = fixed[..., :, 1] * c - fixed[..., :, 0] * s
-            frames[..., number, :, :] = T
-        frames[..., -1, :, :] = T @ self.T_last_tip
-        return frames
+        flat = np.ascontiguousarray(joints, dtype=float).reshape(-1, len(self))
+        frames = np.empty((len(flat), len(self) + 1, 4, 4))
+        fill_all_frames(self.T_parent_joint, self.T_last_tip, flat, frames)
+        return frames.reshape(*np.shape(joints)[:-1], len(self) + 1, 4, 4)
 
     def forward(self, joints: FloatArray) -> FloatArray:
         """Pose T_base_tip of the tip, shape (..., 4, 4)."""
         tip: FloatArray = self.link_frames(joints)[..., -1, :, :]
         return tip
-
-    def jacobian(self, frames: FloatArray) -> FloatArray:
-        """Jacobian of the tip in the base's axes, rotation first, shape (..., 6, J).
-
-        Args:
-            frames: from `link_frames`, shape (..., J + 1, 4, 4).
-        """
-        axes = frames[..., :-1, :3, 2]
-        arms = frames[..., -1:, :3, 3] - frames[..., :-1, :3, 3]
-        return np.concatenate(
-            [np.swapaxes(axes, -1, -2), np.swapaxes(np.cross(axes, arms), -1, -2)], axis=-2
-        )
 
 
 def from_table(

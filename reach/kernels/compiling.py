@@ -20,7 +20,7 @@ from numba import config
 from reach.sources import source_digest
 
 LOGGER = logging.getLogger(__name__)
-NOTICE = "compiling the contact kernels, once per installation: about a minute"
+NOTICE = "compiling the numerical kernels, once per installation: about a minute"
 SILENCE = 600.0
 """Processes that compile within this time of the first one say nothing of it [s]."""
 

@@ -10,9 +10,10 @@ import pytest
 
 from collection.errors import RobotError, UnreachableError, UnsafeMotionError
 from collection.robots.arm_model import arm_model
+from collection.robots.chain_kernels import fill_jacobian, fill_tip_error
 from collection.robots.planner import ArmPlanner
 from collection.robots.protocol import Path, Waypoint
-from collection.robots.reach_search import solve_many, start_configurations, tip_error
+from collection.robots.reach_search import solve_many, start_configurations
 from collection.robots.yumi_arm import CONTROLLER_ORDER, JOINT_NAMES, yumi_arm
 from reach.gripper import ParallelJawGripper
 from reach.transforms import exp, make_transform, rotation_about
@@ -30,6 +31,12 @@ def from_above(x: float, y: float, z: float, yaw: float = 0.0, tilt: float = 0.0
     rotation = rotation_about((0, 0, 1), yaw) @ rotation_about((0, 1, 0), tilt)
     rotation = rotation @ np.diag([1.0, -1.0, -1.0])
     return np.array(make_transform(rotation, np.array([x, y, z]) - 0.160098 * rotation[:, 2]))
+
+
+def tip_error(T: np.ndarray, T_target: np.ndarray) -> np.ndarray:
+    error = np.empty(6)
+    fill_tip_error(np.array(T), np.array(T_target), error)
+    return error
 
 
 def test_home_puts_the_flange_where_the_maker_says() -> None:
@@ -64,12 +71,13 @@ def test_the_jacobian_is_the_derivative_of_the_forward_kinematics() -> None:
     chain = yumi_arm("right").chain
     rng = np.random.default_rng(1)
     joints = rng.uniform(chain.lower, chain.upper)
-    J = chain.jacobian(chain.link_frames(joints[None]))[0]
+    J = np.empty((6, len(chain)))
+    fill_jacobian(chain.link_frames(joints), J)
     for column in range(len(chain)):
         step = np.zeros(len(chain))
         step[column] = 1e-6
         ahead, behind = chain.forward(joints + step), chain.forward(joints - step)
-        difference = tip_error(behind[None], ahead[None])[0] / 2e-6
+        difference = tip_error(behind, ahead) / 2e-6
         np.testing.assert_allclose(J[:, column], difference, atol=1e-6)
 
 
@@ -79,7 +87,7 @@ def test_the_error_of_a_pose_is_its_twist_in_base_axes() -> None:
     moved = T.copy()
     moved[:3, :3] = exp(np.concatenate([twist[:3], np.zeros(3)]))[:3, :3] @ T[:3, :3]
     moved[:3, 3] += twist[3:]
-    np.testing.assert_allclose(tip_error(T[None], moved[None])[0], twist, atol=1e-9)
+    np.testing.assert_allclose(tip_error(T, moved), twist, atol=1e-9)
 
 
 def test_solutions_reach_their_poses_within_limits() -> None:
@@ -94,7 +102,7 @@ def test_solutions_reach_their_poses_within_limits() -> None:
         for solution in joints[row, solved[row]]:
             assert np.all(solution >= arm.chain.lower - 1e-9)
             assert np.all(solution <= arm.chain.upper + 1e-9)
-            error = tip_error(arm.chain.forward(solution)[None], poses[row][None])[0]
+            error = tip_error(arm.chain.forward(solution), poses[row])
             assert np.linalg.norm(error[:3]) < 1e-3
             assert np.linalg.norm(error[3:]) < 1e-4
 
