@@ -52,7 +52,9 @@ def calibrate(
     import json
 
     from collection.calibration.procedure import calibrate_views, read_views
+    from collection.targets import check_files
 
+    check_files([out])
     wanted = _parse_board(board, square)
     place = folder or out.with_name(out.stem + "-views")
     if station is not None:

@@ -80,7 +80,7 @@ def _print_table(rows: list[dict[str, Any]]) -> None:
     from rich.console import Console
     from rich.table import Table
 
-    table = Table(title=f"{len(rows)} parts", box=None)
+    table = Table(title=f"{len(rows)} {'part' if len(rows) == 1 else 'parts'}", box=None)
     for heading in ("part", "faces", "size mm", "mass g", "symmetry", "stable poses %"):
         table.add_column(heading, no_wrap=True)
     for row in rows:

@@ -56,11 +56,13 @@ def register(
     """
     from collection.cloud_file import read_cloud
     from collection.objects import load_object
+    from collection.targets import check_files
     from registration import register as find
     from registration.picture import check_picture, save_picture
 
     if picture is not None:
         check_picture(picture)
+    check_files([picture])
     part = load_object(mesh, mesh_unit)
     frame = read_cloud(cloud, camera, sensor)
     _check_unit(cloud, frame)

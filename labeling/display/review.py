@@ -9,6 +9,7 @@ from pydantic import BaseModel, ConfigDict
 from labeling.display.view import View, label_view, to_judge, trial_view
 from logs.journal.events import LabelEvent, Outcome
 from logs.journal.state import SessionState, TakeState, TrialState
+from logs.prediction import predicts_success
 
 DISAGREEMENT: Final = "disagreement"
 
@@ -83,7 +84,7 @@ def disagrees(take: TakeState, model: str) -> bool:
     score = take.scores.get(model)
     if label is None or score is None:
         return False
-    return (score.value >= 0.5) != (label.outcome is Outcome.SUCCESS)
+    return predicts_success(score.value) != (label.outcome is Outcome.SUCCESS)
 
 
 def models_scored(state: SessionState) -> tuple[str, ...]:

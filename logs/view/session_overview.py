@@ -6,12 +6,12 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 from logs.errors import ViewError
+from logs.prediction import predicts_success
 from logs.session.index_table import IndexRow
 from reach.models.names import JUDGES
 
 TIMELINES = ("disagreement", "trial", "by_object", "by_outcome")
 """Orders to browse in; each counts from 1."""
-PREDICTS_SUCCESS = 0.5
 
 
 @dataclass(frozen=True, slots=True)
@@ -98,8 +98,7 @@ def _outcome_order(row: IndexRow) -> tuple[str, str]:
 
 
 def _wrong(row: IndexRow) -> tuple[str, ...]:
-    """A score of exactly one half names success, as everywhere."""
     if row.outcome is None:
         return ()
     label = row.outcome == "success"
-    return tuple(m for m, value in row.scores.items() if (value >= PREDICTS_SUCCESS) != label)
+    return tuple(m for m, value in row.scores.items() if predicts_success(value) != label)

@@ -6,14 +6,12 @@ import json
 
 import numpy as np
 
+from logs.prediction import predicts_success
 from logs.record.annotations import Annotations, LabelRecord, ScoreRecord
 from logs.record.trial_record import TrialRecord
 from logs.view.contacts import brightest_pressure, highest_pressure
 from reach.models.names import PATCH_MODEL
 from reach.pose_error import PoseError
-
-DISAGREES = 0.5
-"""A model predicts success from this score on."""
 
 
 def summary(record: TrialRecord, annotations: Annotations, *, blind: bool) -> str:
@@ -50,7 +48,7 @@ def outcome_words(label: LabelRecord | None) -> str:
 
 def agrees(score: ScoreRecord, label: LabelRecord) -> bool:
     """Whether a prediction and the label name the same outcome."""
-    return (score.value >= DISAGREES) == (label.outcome == "success")
+    return predicts_success(score.value) == (label.outcome == "success")
 
 
 def _verdict(label: LabelRecord | None) -> str:

@@ -155,9 +155,11 @@ def test_ghosts_can_be_switched_off(viewer, take: Path, tmp_path: Path, monkeypa
     monkeypatch.setattr("logs.view.trial.APPLICATION", "reach-trials without ghosts")
     open_file(viewer, derive_rrd(take, tmp_path / "hidden.rrd"))
     view_id = next(v for v in viewer.get_state().views if v.name == "scene").view_id
-    viewer.set_time("elapsed", duration=3.2, play_state="paused")
+    viewer.set_time("elapsed", duration=2.0, play_state="paused")
     wait_for(lambda: pixels_of(viewer, view_id).std() > 10, "the scene is drawn")
-    time.sleep(1)  # ghosts would be drawn by now, as above
+    jaws_open = pixels_of(viewer, view_id)
+    viewer.set_time("elapsed", duration=3.2, play_state="paused")
+    wait_for(lambda: np.abs(pixels_of(viewer, view_id) - jaws_open).max() > 50, "the jaws closed")
     assert ghost_pixels(viewer, view_id) < 30
     assert healthy(viewer.get_state().views)
 
