@@ -10,7 +10,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from collection.plan.records import PlannedGrasp, PlannedPose, PlannedTrial
-from collection.robots import protocol
+from collection.robots.description import RobotDescription, Shape
 from collection.robots.execution import Execution, Phase
 from logs.record import descriptions
 from logs.record.records import ExecutionRecord, RegistrationRecord, RivalRecord, TrialDescriptor
@@ -163,7 +163,7 @@ def execution_record(
     )
 
 
-def robot_description(robot: protocol.RobotDescription) -> descriptions.RobotDescription:
+def robot_description(robot: RobotDescription) -> descriptions.RobotDescription:
     """The robot's shapes, by link."""
     links: dict[str, list[descriptions.Shape]] = {}
     for shape in robot.shapes:
@@ -175,8 +175,8 @@ def robot_description(robot: protocol.RobotDescription) -> descriptions.RobotDes
     )
 
 
-def _shape(shape: protocol.Shape) -> descriptions.Shape:
-    # The protocol gives half lengths, the record full ones.
+def _shape(shape: Shape) -> descriptions.Shape:
+    # The arm gives half lengths, the record full ones.
     if shape.kind == "box":
         size = tuple(2 * half for half in shape.size)
     else:

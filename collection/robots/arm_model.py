@@ -8,7 +8,7 @@ from typing import Any
 import mujoco
 import numpy as np
 
-from collection.robots.protocol import Shape
+from collection.robots.description import Shape
 from collection.robots.yumi_arm import JOINT_NAMES, YumiArm, gripper_shapes, link_name
 from reach.arrays import FloatArray, frozen
 from reach.gripper import ParallelJawGripper

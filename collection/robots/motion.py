@@ -22,13 +22,7 @@ from collection.robots.execution import (
 )
 from collection.robots.motion_recorder import EventListener, MotionRecorder, SampleListener
 from collection.robots.motion_settings import MotionSettings
-from collection.robots.protocol import (
-    Arm,
-    GripperDevice,
-    Path,
-    Speed,
-    Waypoint,
-)
+from collection.robots.protocol import Arm, GripperDevice, Path, Speed, Waypoint
 from collection.robots.waypoints import (
     approach_pose,
     avoidance_pose,

@@ -9,7 +9,8 @@ import numpy as np
 
 from collection.clock import Clock
 from collection.robots.execution import Phase, PhaseEvent, PhaseSpan, TraceSample
-from collection.robots.protocol import ArmSample, GripperDevice, GripperSample
+from collection.robots.protocol import GripperDevice
+from collection.robots.readings import ArmSample, GripperSample
 from reach.arrays import FloatArray, frozen
 from reach.transforms import make_transform
 

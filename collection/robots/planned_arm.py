@@ -10,13 +10,9 @@ from typing import TYPE_CHECKING, ClassVar, Self
 import numpy as np
 
 from collection.errors import JointLimitError
-from collection.robots.protocol import (
-    ArmListener,
-    Motion,
-    RobotDescription,
-    Speed,
-    Waypoint,
-)
+from collection.robots.description import RobotDescription
+from collection.robots.protocol import Speed, Waypoint
+from collection.robots.readings import ArmListener, Motion
 from reach.arrays import BoolArray, FloatArray
 
 if TYPE_CHECKING:

@@ -10,8 +10,9 @@ import numpy as np
 
 from collection.errors import RobotError, UnreachableError, UnsafeMotionError
 from collection.robots.arm_model import arm_model
+from collection.robots.description import RobotDescription
 from collection.robots.inverse_kinematics import CollisionCheck, LineFollower
-from collection.robots.protocol import Path, RobotDescription, Waypoint
+from collection.robots.protocol import Path, Waypoint
 from collection.robots.reach_search import solve_many, start_configurations
 from collection.robots.yumi_arm import JOINT_NAMES, YumiArm, link_name
 from reach.arrays import BoolArray, FloatArray

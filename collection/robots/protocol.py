@@ -9,11 +9,21 @@ it is done, returns what was really executed with its times, and raises a typed
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
 from typing import Protocol, Self
 
+from collection.robots.description import RobotDescription
+from collection.robots.readings import (
+    ArmListener,
+    ArmState,
+    GripperListener,
+    GripperMotion,
+    GripperSample,
+    GripperState,
+    Motion,
+)
 from reach.arrays import BoolArray, FloatArray
 from reach.gripper import ParallelJawGripper
 
@@ -41,44 +51,6 @@ class Speed:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class ArmSample:
-    """One reading of the arm: time [ns], joints (J,) [rad], measured T_world_gripper (4, 4)."""
-
-    time_ns: int
-    joints: FloatArray
-    T_world_gripper: FloatArray
-
-
-@dataclass(frozen=True, slots=True)
-class GripperSample:
-    """One reading of the hand: time [ns], distance of the pads' faces [m], grip force [N]."""
-
-    time_ns: int
-    width: float
-    force: float
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Motion:
-    """An executed motion of the arm: when, and where it measured itself to be at the end."""
-
-    start_ns: int
-    end_ns: int
-    joints: FloatArray
-    T_world_gripper: FloatArray
-
-
-@dataclass(frozen=True, slots=True)
-class GripperMotion:
-    """An executed motion of the jaws; width [m] and force [N] as read at its end."""
-
-    start_ns: int
-    end_ns: int
-    width: float
-    force: float
-
-
-@dataclass(frozen=True, slots=True, eq=False)
 class Waypoint:
     """One step of a planned motion, for the dry run.
 
@@ -93,80 +65,6 @@ class Waypoint:
     T_world_gripper: FloatArray
     path: Path = Path.LINEAR
     opening: float | None = None
-
-
-@dataclass(frozen=True, slots=True)
-class ArmState:
-    """What the controller says of itself; a diagnosis reads it, a trial checks `ready`."""
-
-    connected: bool
-    motors_on: bool
-    automatic: bool
-    emergency_stop: bool = False
-    error: str | None = None
-
-    @property
-    def ready(self) -> bool:
-        """Whether the arm will follow a command."""
-        healthy = not self.emergency_stop and self.error is None
-        return self.connected and self.motors_on and self.automatic and healthy
-
-
-@dataclass(frozen=True, slots=True)
-class GripperState:
-    """What the hand says of itself."""
-
-    connected: bool
-    calibrated: bool
-    error: str | None = None
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Shape:
-    """A primitive of the robot's body.
-
-    Args:
-        link: the link it moves with, a key of `Arm.link_transforms`.
-        kind: `box`, `cylinder` (along z) or `capsule` (along z).
-        size: box: half extents (x, y, z); cylinder, capsule: (radius, half length) [m].
-        T_link_shape: pose of its center, shape (4, 4).
-        rgba: color, each in [0, 1].
-    """
-
-    link: str
-    kind: str
-    size: tuple[float, ...]
-    T_link_shape: FloatArray
-    rgba: tuple[float, float, float, float] = (0.85, 0.85, 0.87, 1.0)
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class RobotDescription:
-    """The robot as pictures and records need it.
-
-    Args:
-        name: of the robot.
-        joint_names: in the order of every joint vector.
-        lower: joint limits, shape (J,) [rad].
-        upper: joint limits, shape (J,) [rad].
-        max_speed: of the joints, shape (J,) [rad/s].
-        home: shape (J,) [rad].
-        shapes: primitives of all links.
-        mjcf: the same as a MuJoCo model, to attach to a record.
-    """
-
-    name: str
-    joint_names: tuple[str, ...]
-    lower: FloatArray
-    upper: FloatArray
-    max_speed: FloatArray
-    home: FloatArray
-    shapes: tuple[Shape, ...]
-    mjcf: str
-
-
-ArmListener = Callable[[ArmSample], None]
-GripperListener = Callable[[GripperSample], None]
 
 
 class Arm(Protocol):

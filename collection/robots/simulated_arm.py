@@ -14,15 +14,8 @@ from collection.errors import (
 )
 from collection.robots.planned_arm import PlannedArm
 from collection.robots.planner import ArmPlanner, JointPath
-from collection.robots.protocol import (
-    ArmListener,
-    ArmSample,
-    ArmState,
-    Motion,
-    Path,
-    Speed,
-    Waypoint,
-)
+from collection.robots.protocol import Path, Speed, Waypoint
+from collection.robots.readings import ArmListener, ArmSample, ArmState, Motion
 from collection.robots.simulated_controller import SimulatedController
 from reach.arrays import FloatArray, frozen
 from reach.transforms import inverse, rotation_angle

@@ -11,7 +11,7 @@ from collection.errors import (
     RobotError,
     StoppedError,
 )
-from collection.robots.protocol import ArmState
+from collection.robots.readings import ArmState
 from collection.robots.stop_latch import STOPPED, StopLatch
 
 

@@ -6,7 +6,7 @@ from typing import Self
 
 from collection.cell.faults import FaultKind
 from collection.errors import GripperNotCalibratedError, RobotTimeoutError, StoppedError
-from collection.robots.protocol import GripperListener, GripperMotion, GripperSample, GripperState
+from collection.robots.readings import GripperListener, GripperMotion, GripperSample, GripperState
 from collection.robots.simulated_controller import SimulatedController
 from reach.arrays import positive
 from reach.errors import InvalidInputError

@@ -12,8 +12,8 @@ from math import pi, radians
 
 import numpy as np
 
+from collection.robots.description import Shape
 from collection.robots.kinematics import SerialChain, from_table
-from collection.robots.protocol import Shape
 from reach.arrays import FloatArray, frozen
 from reach.gripper import ParallelJawGripper
 from reach.transforms import make_transform, rotation_about

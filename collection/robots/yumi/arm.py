@@ -10,15 +10,8 @@ import numpy as np
 
 from collection.errors import RobotError
 from collection.robots.planned_arm import PlannedArm
-from collection.robots.protocol import (
-    ArmListener,
-    ArmSample,
-    ArmState,
-    Motion,
-    Path,
-    Speed,
-    Waypoint,
-)
+from collection.robots.protocol import Path, Speed, Waypoint
+from collection.robots.readings import ArmListener, ArmSample, ArmState, Motion
 from collection.robots.stop_latch import STOPPED
 from collection.robots.yumi.checks import controller_checks
 from collection.robots.yumi.diagnosis import not_ready

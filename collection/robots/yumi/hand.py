@@ -5,12 +5,7 @@ from __future__ import annotations
 from typing import Self
 
 from collection.errors import GripperNotCalibratedError, RobotError
-from collection.robots.protocol import (
-    GripperListener,
-    GripperMotion,
-    GripperSample,
-    GripperState,
-)
+from collection.robots.readings import GripperListener, GripperMotion, GripperSample, GripperState
 from collection.robots.yumi.link import PING_TIMEOUT, ControllerLink
 from collection.robots.yumi.messages import Command, Request, readable_jaw
 from reach.errors import InvalidInputError

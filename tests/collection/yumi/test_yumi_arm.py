@@ -21,7 +21,8 @@ from collection.errors import (
     UnsafeMotionError,
 )
 from collection.robots.planner import JointPath
-from collection.robots.protocol import ArmSample, Path, Speed, Waypoint
+from collection.robots.protocol import Path, Speed, Waypoint
+from collection.robots.readings import ArmSample
 from collection.robots.yumi.arm import YumiRobotArm
 from collection.robots.yumi.config import YumiConfig
 from collection.robots.yumi_arm import CONTROLLER_ORDER, yumi_arm

@@ -6,7 +6,7 @@ import pytest
 from yumi_emulator import Arm, Controller
 
 from collection.errors import GripperNotCalibratedError, Recovery, RobotError, StoppedError
-from collection.robots.protocol import GripperSample
+from collection.robots.readings import GripperSample
 from collection.robots.yumi.hand import SmartGripper
 from reach.errors import InvalidInputError
 
