@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 from reach.arrays import FloatArray
-from reach.kernels.compiling import compiled
+from reach.kernels.compiling import compiled, plain
+
+CORNERS = plain(3)
+"""Of a triangle."""
 
 
 @compiled

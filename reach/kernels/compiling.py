@@ -3,6 +3,10 @@
 Numba's own cache looks at the file of a function, not at the files of the functions it calls. So
 the cache folder here carries a digest of every kernel's source: a changed callee can never leave
 an outdated caller behind.
+
+What makes a kernel slow to compile, measured: levels of calls (`compiled_in_place` removes one);
+an array assigned to a part of another one, `a[i] = b`, for which numba compiles its whole handling
+of strings to word an error (loops over numbers cost nothing); and literal arguments (`plain`).
 """
 
 from __future__ import annotations
@@ -12,9 +16,10 @@ import os
 import time
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any, TypeVar, cast
 
 import numba
+import numpy as np
 from numba import config
 
 from reach.sources import source_digest
@@ -58,6 +63,20 @@ def _compile(function: Function, **options: Any) -> Function:
 def compiled(function: Function) -> Function:
     """Compile a function with numba: no Python objects, no interpreter lock, cached on disk."""
     return _compile(function)
+
+
+def plain(value: int) -> int:
+    """Make an integer for an argument of kernels; they are compiled anew for a literal one."""
+    return cast(int, np.int64(value))
+
+
+def compiled_in_place(function: Function) -> Function:
+    """Compile a function as a part of each kernel that calls it.
+
+    For long functions that are called from one place: numba optimizes all that a function calls
+    once more with the function, so that every level of calls costs as much as the levels below it.
+    """
+    return _compile(function, inline="always")
 
 
 def compiled_reductions(function: Function) -> Function:

@@ -16,10 +16,10 @@ import numpy as np
 
 from reach.arrays import FloatArray, IntArray
 from reach.kernels.compiling import compiled
-from reach.kernels.elements import POINT
+from reach.kernels.elements import POINT, START
 from reach.kernels.ellipse_contact import HERTZ_TORSION, fit_ellipse
 from reach.kernels.friction_point import place_contact, write_friction_point, write_normal_force
-from reach.kernels.min_norm import exit_of_ray
+from reach.kernels.min_norm import WRENCHES, exit_of_ray
 from reach.kernels.pads import Pads
 from reach.kernels.point_contact import contact_point
 from reach.kernels.tree import MeshTree
@@ -45,7 +45,7 @@ def _holds(
     ray = np.zeros(6)
     for i in range(3):
         ray[i] = -gravity[i]
-    margin, _ = exit_of_ray(normals, points, starts, ray, cap, TOLERANCE, MOST_STEPS, 6)
+    margin, _ = exit_of_ray(normals, points, starts, ray, cap, TOLERANCE, MOST_STEPS, WRENCHES)
     return bool(margin >= 1.0)
 
 
@@ -127,7 +127,7 @@ def count_area_draws(
         T = T_object_gripper[n]
         to_com, gravity = to_wrench_frame(T, com_object, gravity_object[n])
         for k in range(len(depth)):
-            contacts, column = 0, 0
+            contacts, column = 0, START
             for jaw in range(jaws):
                 T_pad = pads.T_gripper_pad[jaw]
                 count, high, space = find_patch(

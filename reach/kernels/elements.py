@@ -23,13 +23,15 @@ from __future__ import annotations
 import numpy as np
 
 from reach.arrays import FloatArray
-from reach.kernels.compiling import compiled
+from reach.kernels.compiling import compiled, compiled_in_place, plain
 
 POINT = 13
 """Rows: c 0-2, M (xx, yy, zz, xy, xz, yz) 3-8, b 9-11, f 12; lengths over the torque scale."""
+START = plain(0)
+"""First column."""
 
 
-@compiled
+@compiled_in_place
 def _rotated_form(T: FloatArray, i: int, j: int, m: FloatArray, group: int) -> float:
     """Entry i, j of R N R', N the second moments of the normals in columns 13-18."""
     x = T[j, 0] * m[group, 13] + T[j, 1] * m[group, 16] + T[j, 2] * m[group, 17]

@@ -11,7 +11,7 @@ from __future__ import annotations
 import numpy as np
 
 from reach.arrays import FloatArray, IntArray
-from reach.kernels.compiling import compiled
+from reach.kernels.compiling import compiled, plain
 from reach.kernels.support import support
 
 MOST_POINTS = 7
@@ -22,6 +22,8 @@ MOST_STALLS = 8
 SMALLEST = 1e-3
 """A ray that leaves the set before this point is said to leave it at the origin; the iteration would
 only approach that answer."""
+FORCES, WRENCHES = plain(3), plain(6)
+"""Dimensions in which a ray may leave."""
 
 
 @compiled
@@ -114,7 +116,8 @@ def nearest_in_hull(
                 if convex[i] < convex[drop]:
                     drop = i
         count -= 1
-        points[drop] = points[count]
+        for k in range(6):
+            points[drop, k] = points[count, k]
         convex[drop] = convex[count]
         total = 0.0
         for i in range(count):

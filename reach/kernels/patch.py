@@ -175,6 +175,9 @@ def _grown(
     triangles: FloatArray, normals: FloatArray, count: int, capacity: int
 ) -> tuple[FloatArray, FloatArray]:
     more_triangles, more_normals = np.empty((capacity, 3, 3)), np.empty((capacity, 3))
-    more_triangles[:count] = triangles[:count]
-    more_normals[:count] = normals[:count]
+    for t in range(count):
+        for axis in range(3):
+            more_normals[t, axis] = normals[t, axis]
+            for corner in range(3):
+                more_triangles[t, corner, axis] = triangles[t, corner, axis]
     return more_triangles, more_normals

@@ -144,7 +144,8 @@ def contact_point(
     if owner < 0:
         owner = nearest_to_axis(count, space.triangles, space.normals, 0.0, point)
     if owner >= 0:
-        normal[:] = space.normals[owner]
+        for i in range(3):
+            normal[i] = space.normals[owner, i]
     return owner >= 0, space
 
 

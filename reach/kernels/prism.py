@@ -7,7 +7,7 @@ expressed in the frame of the opened pad: z is the depth.
 from __future__ import annotations
 
 from reach.arrays import FloatArray
-from reach.kernels.clipping import cut
+from reach.kernels.clipping import CORNERS, cut
 from reach.kernels.compiling import compiled
 
 FACING = 1e-6
@@ -175,7 +175,7 @@ def clip_to_prism(
     Returns:
         Number of corners, 0 if nothing is left.
     """
-    count = 3
+    count = CORNERS
     for i in range(3):
         for axis in range(3):
             polygon[i, axis] = corners[i, axis]

@@ -11,10 +11,11 @@ from typing import NamedTuple
 import numpy as np
 
 from reach.arrays import FloatArray, IntArray
-from reach.kernels.compiling import compiled
+from reach.kernels.compiling import compiled, compiled_in_place
 from reach.kernels.pads import Pads
 from reach.kernels.settle_motion import (
     closing_axis,
+    copy_pose,
     motion_between,
     motions_in_air,
     motions_on_table,
@@ -70,7 +71,7 @@ def ways_of(mesh: MeshTree, pads: Pads, com: FloatArray) -> Ways:
     return Ways(axis, common, in_air, seen, spread_about(mesh, com))
 
 
-@compiled
+@compiled_in_place
 def close(
     mesh: MeshTree, pads: Pads, T_object_gripper: FloatArray, up_object: FloatArray, hand: Hand,
     ways: Ways, room: Room, path: FloatArray,
@@ -92,18 +93,19 @@ def close(
     for i in range(3):
         level += motions[1, i] * ways.axis[i]
     if len(path):
-        path[0] = T
+        copy_pose(T, path[0])
     if not ways.common or len(pads.edges) != 2 or abs(level) < LEVEL:
         return T, 1, motions
     T, step = push(
         mesh, pads, T, hand, motions, gyration_about(ways.spread, up_object), room, path, 1
     )
     left = np.empty((2, 6))
-    left[0], left[1] = motions[0], motions[2]
+    for i in range(6):
+        left[0, i], left[1, i] = motions[0, i], motions[2, i]
     return T, step, left
 
 
-@compiled
+@compiled_in_place
 def judge_one(
     mesh: MeshTree, pads: Pads, T_object_gripper: FloatArray, gravity_object: FloatArray,
     hand: Hand, ways: Ways, cap: float, room: Room, areas: FloatArray, row: FloatArray,
@@ -139,7 +141,8 @@ def judge_one(
     found = list_all(mesh, pads, T_rest, room)
     press_all(mesh, pads, T_rest, hand, found, room)
     describe(pads, found, room, row)
-    areas[:] = room.areas
+    for jaw in range(len(areas)):
+        areas[jaw] = room.areas[jaw]
 
     T, end, lost, points, row[0], lengths[1] = slide(
         mesh, pads, T_rest, weight, hand, ways.in_air, ways.seen_in_air, room, path, step
@@ -153,7 +156,7 @@ def judge_one(
     return margin_of(weight, ways.seen_in_air, points, hand, cap, room), HELD, 0
 
 
-@compiled
+@compiled_in_place
 def describe(pads: Pads, found: list[Candidates], room: Room, row: FloatArray) -> None:
     """Write features 4, 5, 8 and on: areas, distances to the outline, and depths."""
     row[4], row[5] = np.inf, np.inf
@@ -172,7 +175,7 @@ def describe(pads: Pads, found: list[Candidates], room: Room, row: FloatArray) -
                 row[5] = min(row[5], inside)
 
 
-@compiled
+@compiled_in_place
 def opposed(seen: FloatArray, points: int, room: Room) -> float:
     """Preload over the most that friction could oppose to it in its own direction."""
     d, new = np.zeros(6), np.zeros(6)

@@ -7,12 +7,10 @@ a settling part asks for these dozens of times.
 
 from __future__ import annotations
 
-from typing import cast
-
 import numpy as np
 
 from reach.arrays import FloatArray, IntArray
-from reach.kernels.clipping import cut
+from reach.kernels.clipping import CORNERS, cut
 from reach.kernels.compiling import compiled
 from reach.kernels.moments import CLASSES, normal_class
 
@@ -21,9 +19,6 @@ CELLS = 4
 GROUPS = CELLS * CELLS * CLASSES
 SUMS = 10
 """Columns: integral of p 0, of p r 1-3, of p n n' (xx, yy, zz, xy, xz, yz) 4-9."""
-START: int = cast(int, np.int64(0))
-CORNERS: int = cast(int, np.int64(3))
-"""Numbers that are no literals: numba compiles a function anew for a literal number."""
 SMALL = 0.5
 """Triangles smaller than this share of a cell go uncut to the cell of their barycenter."""
 
@@ -140,12 +135,12 @@ def add_layer(
     cell, spare = np.empty((16, 3)), np.empty((16, 4))
     area = 0.0
     for t in range(count):
-        corners = 3
+        corners = CORNERS
         least = min(triangles[t, 0, 2], triangles[t, 1, 2], triangles[t, 2, 2])
         most = max(triangles[t, 0, 2], triangles[t, 1, 2], triangles[t, 2, 2])
         if least >= high:
             continue
-        _copy(triangles[t], 3, whole)
+        _copy(triangles[t], CORNERS, whole)
         if most > high:
             corners = cut(whole, CORNERS, 0.0, 0.0, 1.0, high, spare)
             if corners == 0:

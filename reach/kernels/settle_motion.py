@@ -142,6 +142,14 @@ def moved(
 
 
 @compiled
+def copy_pose(T: FloatArray, to: FloatArray) -> None:
+    """Write a pose to another one's place, both of shape (4, 4)."""
+    for i in range(4):
+        for j in range(4):
+            to[i, j] = T[i, j]
+
+
+@compiled
 def motion_between(A: FloatArray, B: FloatArray, com: FloatArray) -> tuple[float, float]:
     """Translation of the center of mass [m] and rotation [rad] of a part seen from the gripper.
 

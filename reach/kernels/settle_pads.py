@@ -5,12 +5,12 @@ from __future__ import annotations
 import numpy as np
 
 from reach.arrays import FloatArray
-from reach.kernels.compiling import compiled
-from reach.kernels.elements import wrench_in_frame
+from reach.kernels.compiling import compiled, compiled_in_place
+from reach.kernels.elements import START, wrench_in_frame
 from reach.kernels.pads import Pads
 from reach.kernels.patch import contact_depth
 from reach.kernels.prism import NEVER, most_pieces
-from reach.kernels.settle_contact import START, add_layer, friction_points_of
+from reach.kernels.settle_contact import add_layer, friction_points_of
 from reach.kernels.settle_press import (
     BACKING,
     DEEPEST,
@@ -27,7 +27,7 @@ MOST_FACTOR = 1e6
 """Pressures to be raised by more than this are those of a pad that meets next to nothing."""
 
 
-@compiled
+@compiled_in_place
 def list_candidates(
     mesh: MeshTree, pads: Pads, jaw: int, T_object_gripper: FloatArray, room: Room
 ) -> Candidates:
@@ -148,7 +148,7 @@ def preload_of(
     )
 
 
-@compiled
+@compiled_in_place
 def preload(
     pads: Pads, T_frame_gripper: FloatArray, hand: Hand, found: list[Candidates], room: Room
 ) -> int:

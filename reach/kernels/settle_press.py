@@ -81,7 +81,8 @@ def gather(
             if along > -SIDEWAYS and _may_meet(mesh.corners, t, T, wide, low - slack, high + slack):
                 if count == len(found):
                     more = np.empty(2 * len(found), np.int64)
-                    more[:count] = found[:count]
+                    for i in range(count):
+                        more[i] = found[i]
                     found = more
                 found[count] = t
                 count += 1

@@ -18,9 +18,9 @@ import numpy as np
 
 from reach.arrays import FloatArray
 from reach.kernels.compiling import compiled
+from reach.kernels.elements import START
 from reach.kernels.pads import Pads
-from reach.kernels.settle_contact import START
-from reach.kernels.settle_motion import moved
+from reach.kernels.settle_motion import copy_pose, moved
 from reach.kernels.settle_pads import list_all, preload_of, press_all
 from reach.kernels.settle_room import SLACK, Hand, Room
 from reach.kernels.tree import MeshTree
@@ -102,7 +102,7 @@ def push(
             found, used = list_all(mesh, pads, T, room), 2.0 * length * size
         T = moved(T, hand.com, twist, length, hand.length)
         if step < len(path):
-            path[step] = T
+            copy_pose(T, path[step])
         step += 1
     return T, step
 

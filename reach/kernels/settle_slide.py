@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 
 from reach.arrays import FloatArray
-from reach.kernels.compiling import compiled
+from reach.kernels.compiling import compiled, compiled_in_place
 from reach.kernels.pads import Pads
 from reach.kernels.settle_balance import residual
-from reach.kernels.settle_motion import moved
+from reach.kernels.settle_motion import copy_pose, moved
 from reach.kernels.settle_pads import list_all, preload, press_all, reach_of
 from reach.kernels.settle_room import SLACK, Hand, Room
 from reach.kernels.tree import MeshTree
@@ -28,7 +28,7 @@ SHORTER = 0.4
 MOST_STEPS = 80
 
 
-@compiled
+@compiled_in_place
 def unbalanced(
     weight: FloatArray, share: float, seen: FloatArray, points: int, balanced: float, room: Room,
     result: FloatArray,
@@ -62,7 +62,7 @@ def in_balance(
     return alone <= enough and left <= alone + WEIGHT_SHARE * heavy, left
 
 
-@compiled
+@compiled_in_place
 def way_out(
     motions: FloatArray, seen: FloatArray, weight: FloatArray, y: FloatArray, left: float,
     room: Room, twist: FloatArray,
@@ -161,14 +161,14 @@ def slide(
         T, potential, used = after, value, used + length * reach
         longest = min(most, 2.0 * length)
         if step < len(path):
-            path[step] = T
+            copy_pose(T, path[step])
         step += 1
         if lost:
             return T, GONE, lost, 0, left, step
     return T, MOVING, 0, points, left, step
 
 
-@compiled
+@compiled_in_place
 def margin_of(
     weight: FloatArray, seen: FloatArray, points: int, hand: Hand, cap: float, room: Room
 ) -> float:

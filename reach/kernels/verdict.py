@@ -8,8 +8,8 @@ import numpy as np
 
 from reach.arrays import FloatArray, IntArray
 from reach.kernels.compiling import compiled
-from reach.kernels.elements import POINT, friction_points, wrench_in_frame
-from reach.kernels.min_norm import exit_of_ray
+from reach.kernels.elements import POINT, START, friction_points, wrench_in_frame
+from reach.kernels.min_norm import FORCES, WRENCHES, exit_of_ray
 from reach.kernels.moments import GROUPS, MOMENTS, cell_moments
 from reach.kernels.pads import Pads
 from reach.kernels.patch import collect_patch, contact_depth
@@ -188,10 +188,10 @@ def hold(
     ray = np.zeros(6)
     for i in range(3):
         ray[i] = -gravity[i]
-    margin, _ = exit_of_ray(normals, points, starts, ray, cap, TOLERANCE, MOST_STEPS, 6)
+    margin, _ = exit_of_ray(normals, points, starts, ray, cap, TOLERANCE, MOST_STEPS, WRENCHES)
     if margin >= 1.0:
         return margin, HOLDS
-    force_margin, _ = exit_of_ray(normals, points, starts, ray, 1.0, TOLERANCE, MOST_STEPS, 3)
+    force_margin, _ = exit_of_ray(normals, points, starts, ray, 1.0, TOLERANCE, MOST_STEPS, FORCES)
     return margin, SLIPS if force_margin < 1.0 else TURNS
 
 
@@ -237,7 +237,7 @@ def judge_area_contacts(
     for n in range(len(margins)):
         T = T_object_gripper[n]
         to_com, gravity = to_wrench_frame(T, com_object[n], gravity_object[n])
-        contacts, column, lost = 0, 0, 0
+        contacts, column, lost = 0, START, 0
         starts[0] = 0
         for jaw in range(jaws):
             T_pad = pads.T_gripper_pad[jaw]
