@@ -281,7 +281,7 @@ def test_a_stop_acts_before_the_lock_and_while_someone_holds_it(make_bench: Any)
     presser = threading.Thread(target=bench.controller.submit, args=(command, BOB))
     with bench.controller.reading():  # the lock is taken
         presser.start()
-        assert stopped.wait(5)
+        assert stopped.wait(60)
         assert not bench.state.stopped  # acted, not yet logged
     presser.join()
     assert bench.state.stopped

@@ -76,7 +76,7 @@ def test_a_recorded_session_is_relabeled_and_left_as_it_ended(bench: Any, start:
     answer = relabel(client, item, "relabel", outcome="failure", reason="other", note="slow look")
     assert answer["status"] == "stored"
     process.send_signal(signal.SIGINT)
-    assert process.wait(10) == 0
+    assert process.wait(60) == 0
     state = bench.folder.read_state()
     label = state.order[0].label
     assert (label.operator, label.outcome, label.note) == ("bo", "failure", "slow look")
@@ -93,7 +93,7 @@ def test_a_second_operator_labels_blindly_and_agreement_is_printed(bench: Any, s
         assert item["label"] is None
         assert relabel(client, item, "second_label", outcome="success")["status"] == "stored"
     process.send_signal(signal.SIGTERM)
-    printed, _ = process.communicate(timeout=10)
+    printed, _ = process.communicate(timeout=60)
     assert "1 of 2 pairs of blind verdicts on 2 trials agree" in printed
     found = json.loads(run(LABEL, str(bench.folder.path), "--agreement", "--json"))
     assert found == {
@@ -117,7 +117,7 @@ def test_practice_runs_without_a_session(start: Any, tmp_path: Path) -> None:
     process, client = start("--practice")
     assert client.get("/api/view").json()["practice"] is True
     process.send_signal(signal.SIGINT)
-    assert process.wait(10) == 0
+    assert process.wait(60) == 0
 
 
 def test_status_counts_a_session_under_way(bench: Any) -> None:

@@ -61,13 +61,13 @@ def test_stops_from_several_threads_are_all_counted() -> None:
 
     def press() -> None:
         with count.pressed():
-            inside.wait(5)
-            leave.wait(5)
+            inside.wait(60)
+            leave.wait(60)
 
     threads = [threading.Thread(target=press) for _ in range(2)]
     for thread in threads:
         thread.start()
-    inside.wait(5)
+    inside.wait(60)
     assert count.under_way
     leave.set()
     for thread in threads:

@@ -93,11 +93,11 @@ def test_a_label_is_stored_while_its_file_still_waits(
 
     def slow(_entry: object) -> None:
         begun.set()
-        go_on.wait(10)
+        go_on.wait(60)
 
     monkeypatch.setattr(journal.mirror, "note", slow)
     entry = journal.append(LABEL)
-    assert begun.wait(10)
+    assert begun.wait(60)
     assert read_journal(folder.journal_path)[-1] == entry
     go_on.set()
 

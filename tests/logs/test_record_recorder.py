@@ -23,7 +23,7 @@ def stalled(monkeypatch):
     real = mcap_file.DurableMcap.flush
 
     def flush(self) -> None:
-        assert answer.wait(20)
+        assert answer.wait(60)
         real(self)
 
     monkeypatch.setattr(mcap_file.DurableMcap, "flush", flush)

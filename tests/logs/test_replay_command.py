@@ -137,12 +137,15 @@ def test_the_command_says_where_to_look_and_ends_its_server(
     arguments = f"replay {session.path} --trial 2 --web".split()
     command = [sys.executable, "-c", program, *arguments]
     with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as process:
-        assert process.stdout is not None
-        lines = [process.stdout.readline() for _ in range(3)]
-        port = int(lines[0].split("127.0.0.1:")[1].split("/")[0])
-        assert lines[1].split(": ")[1].startswith(f"ssh -N -L {port}:")
-        assert get(port, "/")[0] == 200
-        process.send_signal(ending)
-        assert process.wait(20) == 0
+        try:
+            assert process.stdout is not None
+            lines = [process.stdout.readline() for _ in range(3)]
+            port = int(lines[0].split("127.0.0.1:")[1].split("/")[0])
+            assert lines[1].split(": ")[1].startswith(f"ssh -N -L {port}:")
+            assert get(port, "/")[0] == 200
+            process.send_signal(ending)
+            assert process.wait(60) == 0
+        finally:
+            process.kill()
     with pytest.raises(OSError):
         socket.create_connection((LOOPBACK, port), timeout=2).close()
