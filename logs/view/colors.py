@@ -19,7 +19,7 @@ OBJECT: Color = (86, 148, 214, 255)
 OBJECT_GLASS: Color = (86, 148, 214, 60)
 TRUTH: Color = (98, 190, 120, 110)
 RIVAL: Color = (196, 120, 200, 70)
-SETTLING: Color = (255, 120, 110, 40)
+SETTLING: Color = (255, 120, 110, 255)
 SETTLED: Color = (255, 120, 110, 75)
 PLANNED: Color = (250, 224, 94, 255)
 FORCE: Color = (255, 255, 255, 255)
@@ -50,3 +50,9 @@ def pressure_colors(pressures: FloatArray, highest: float) -> NDArray[np.uint8]:
     mixed = _ANCHORS[low] * (1 - between) + _ANCHORS[low + 1] * between
     shades: NDArray[np.uint8] = np.rint(mixed).astype(np.uint8)
     return shades
+
+
+def faded(color: Color, share: float) -> Color:
+    """A color of which only a share is left against the table's."""
+    mixed = [round(share * c + (1 - share) * t) for c, t in zip(color, TABLE, strict=True)]
+    return mixed[0], mixed[1], mixed[2], 255

@@ -39,7 +39,7 @@ class _Step:
         object: T_scene_object, shape (4, 4).
         hand: T_scene_hand, shape (4, 4).
         width: between the pads [m].
-        ghosts: T_scene_object while it settles, each (4, 4).
+        ghosts: T_scene_object where it settles, (4, 4), if it moves.
     """
 
     name: str
@@ -130,7 +130,7 @@ class SessionPoses:
             if triangles is not None:
                 mesh = flat_mesh(triangles, colors.OBJECT_GLASS)
                 self._recording.log(f"{OBJECTS}/{name}", mesh, static=True)
-                ghost = flat_mesh(triangles, colors.SETTLING)
+                ghost = flat_mesh(triangles, colors.SETTLED)
                 self._recording.log(f"{SETTLING}/{name}", ghost, static=True)
         if self._gripper is None:
             self._gripper = recorded_gripper(record)
@@ -138,11 +138,11 @@ class SessionPoses:
                 show_fingers(self._static, HAND, self._gripper)
 
     def _ghosts(self, name: str, scores: Mapping[str, ScoreRecord]) -> list[FloatArray]:
-        """T_world_object on the way that the first model that tells one predicts."""
+        """T_world_object at the end of the way that the first model that tells one predicts."""
         triangles = self._triangles[name]
         path = next((path for s in scores.values() if (path := predicted_path(s))), [])
         found = [] if triangles is None else distinct_poses(path, triangles)
-        return found if len(found) > 1 else []
+        return found[-1:] if len(found) > 1 else []
 
     def _send_instances(
         self, entity: str, times: Sequence[Any], poses: Sequence[Sequence[FloatArray]]

@@ -1,5 +1,8 @@
 """Predicted settling: ghosts of the part on its way from the first press to where it comes to rest.
 
+The way is drawn as outlines, brighter toward its end, and only the end as a body: bodies on the way
+would lie in one another and hide where it leads.
+
 A score may tell that way: its text `path` is a JSON list of T_world_object.
 """
 
@@ -14,7 +17,8 @@ import rerun as rr
 from logs.record.annotations import ScoreRecord
 from logs.view import colors
 from logs.view.object import WORLD
-from logs.view.stage import Stage, flat_mesh
+from logs.view.outline import outline
+from logs.view.stage import Stage, flat_mesh, placed
 from reach.arrays import FloatArray
 from reach.errors import InvalidInputError
 from reach.transforms import as_transform
@@ -25,6 +29,8 @@ LEAST_APART = 2e-3
 """A part that settles by less at all its corners is drawn nowhere else [m]."""
 STEPS = 5
 """So many steps of equal length are drawn at most: more ghosts would only blur."""
+WIDTH = 2e-4
+"""Radius of the outlines [m]."""
 
 
 def show_settling(
@@ -43,9 +49,10 @@ def show_settling(
     for model, score in scores.items():
         ghosts = distinct_poses(predicted_path(score), triangles)
         if len(ghosts) > 1:  # one alone would lie in the part itself
-            entity = f"{SETTLING}/{model}"
-            _show(stage, f"{entity}/way", ghosts[:-1], triangles, time_ns, colors.SETTLING)
-            _show(stage, f"{entity}/settled", ghosts[-1:], triangles, time_ns, colors.SETTLED)
+            way = _outlines(ghosts[:-1], outline(triangles, ghosts[0][2, :3]))
+            stage.at(f"{SETTLING}/{model}/way", time_ns, way)
+            settled = flat_mesh(triangles, colors.SETTLED)
+            stage.at(f"{SETTLING}/{model}/settled", time_ns, settled, placed(ghosts[-1]))
 
 
 def predicted_path(score: ScoreRecord) -> list[FloatArray]:
@@ -82,15 +89,10 @@ def _distance(T_a: FloatArray, T_b: FloatArray, corners: FloatArray) -> float:
     return float(np.linalg.norm(moved, axis=1).max())
 
 
-def _show(
-    stage: Stage,
-    entity: str,
-    poses: Sequence[FloatArray],
-    triangles: FloatArray,
-    time_ns: int,
-    color: colors.Color,
-) -> None:
-    placed = rr.InstancePoses3D(
-        translations=[T[:3, 3] for T in poses], mat3x3=[T[:3, :3] for T in poses]
+def _outlines(poses: Sequence[FloatArray], edges: FloatArray) -> rr.LineStrips3D:
+    """A part's edges (E, 2, 3), object frame, in each of its poses."""
+    strips = [edges @ T[:3, :3].T + T[:3, 3] for T in poses]
+    shades = [colors.faded(colors.SETTLING, (i + 1) / len(poses)) for i in range(len(poses))]
+    return rr.LineStrips3D(
+        np.concatenate(strips), colors=np.repeat(shades, len(edges), axis=0), radii=[WIDTH]
     )
-    stage.at(entity, time_ns, flat_mesh(triangles, color), placed)
