@@ -90,8 +90,8 @@ class LineFollower:
         )
         shares = np.linspace(0.0, 1.0, max(1, int(np.ceil(length))) + 1)
         path = [np.array(joints)]
-        for share in shares[1:]:
-            T = line_point(T_start, T_end, twist, float(share))
+        points = line_points(T_start, T_end, twist, shares[1:])
+        for share, T in zip(shares[1:], points, strict=True):
             solution = self.solve(T, path[-1])
             if solution is None or np.abs(solution - path[-1]).max() > LARGEST_JUMP:
                 raise UnreachableError(
@@ -102,13 +102,13 @@ class LineFollower:
         return np.array(path), shares
 
 
-def line_point(
-    T_start: FloatArray, T_end: FloatArray, twist: FloatArray, share: float
+def line_points(
+    T_start: FloatArray, T_end: FloatArray, twist: FloatArray, shares: FloatArray
 ) -> FloatArray:
-    """Pose at a share of a line: the origin moves straight, the rotation turns evenly."""
-    T: FloatArray = np.array(T_start)
-    T[:3, :3] = T_start[:3, :3] @ exp(np.concatenate([share * twist[:3], np.zeros(3)]))[:3, :3]
-    T[:3, 3] = (1.0 - share) * T_start[:3, 3] + share * T_end[:3, 3]
+    """Poses (N, 4, 4) at shares (N,) of a line: the origin moves straight, the rotation evenly."""
+    turn = np.concatenate([twist[:3], np.zeros(3)])
+    T = T_start @ exp(shares[:, None] * turn)
+    T[:, :3, 3] = (1.0 - shares[:, None]) * T_start[:3, 3] + shares[:, None] * T_end[:3, 3]
     return T
 
 
