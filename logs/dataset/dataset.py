@@ -7,6 +7,7 @@ evaluation needs ([Dataset.cases][]).
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
@@ -215,3 +216,17 @@ def _with_distinct_grasps(datasets: Sequence[Dataset]) -> list[Dataset]:
         )
         for one in datasets
     ]
+
+
+def refuse_empty(dataset: Dataset) -> None:
+    """Refuse a data set in which no trial counts.
+
+    Raises:
+        DatasetError: saying why the planned ones do not.
+    """
+    if not dataset.trials:
+        counts = Counter(row.reason for row in dataset.left_out)
+        reasons = ", ".join(f"{count} {reason}" for reason, count in sorted(counts.items()))
+        raise DatasetError(
+            f"{dataset.name!r} holds no trial that counts; left out: {reasons or 'none'}"
+        )

@@ -17,7 +17,7 @@ from pathlib import Path
 
 from pydantic import ValidationError
 
-from logs.dataset.dataset import Dataset
+from logs.dataset.dataset import Dataset, refuse_empty
 from logs.dataset.labeled_trial import LabeledTrial
 from logs.dataset.manifest import (
     MANIFEST_NAME,
@@ -63,11 +63,7 @@ def write_dataset(dataset: Dataset, folder: Path, formats: Sequence[str] = FORMA
         DatasetError: no trial to write, or the folder is not empty.
     """
     check_formats(formats)
-    if not dataset.trials:
-        raise DatasetError(
-            f"{dataset.name!r} holds no labeled trial: {len(dataset.left_out)} planned ones are "
-            "unlabeled, skipped or void"
-        )
+    refuse_empty(dataset)
     if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
         raise DatasetError(f"{folder} exists and is not empty; choose another folder")
     contents, meshes = _contents(dataset, formats)

@@ -27,6 +27,7 @@ _LEFT_OUT = {
     "pending": "not executed",
     "running": "not finished",
     "skipped": "skipped",
+    "labelled": "labeled, but its record is missing or damaged",
 }
 
 
@@ -40,14 +41,17 @@ def session_dataset(path: Path, *, unblinded: bool = False) -> Dataset:
 
     Raises:
         NotASessionError: no session folder.
-        RecordReadError: a labeled trial's record cannot be read.
+        UnknownFormatError: a later release wrote a record.
         DatasetError: one object name with two geometries.
     """
     folder = SessionFolder.open(path)
     state = folder.read_state()
     name = path.resolve().name
-    counted = [trial for trial in state.order if trial.status == "labelled"]
-    facts = read_facts([_record_path(path, trial) for trial in counted])
+    labeled = [trial for trial in state.order if trial.status == "labelled"]
+    found = zip(labeled, read_facts([_record_path(path, one) for one in labeled]), strict=True)
+    read = {trial.trial_id: one for trial, one in found if one is not None}
+    counted = [trial for trial in labeled if trial.trial_id in read]
+    facts = list(read.values())
     attempts = _attempts(state.order)
     table, station = table_height(folder), station_error(folder)
     trials = tuple(
@@ -63,7 +67,7 @@ def session_dataset(path: Path, *, unblinded: bool = False) -> Dataset:
         mass_sources={one.descriptor.object_name: "stated in the session" for one in facts},
         gripper=_gripper(facts),
         trials=trials,
-        left_out=tuple(_left_out(t, name) for t in state.order if t.status != "labelled"),
+        left_out=tuple(_left_out(t, name) for t in state.order if t.trial_id not in read),
         pose_error=session_pose_error(trials, station),
         notes=_notes(counted, unblinded),
     )

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 
-from logs.dataset.dataset import Dataset, merge
+from logs.dataset.dataset import Dataset, merge, refuse_empty
 from logs.dataset.files import read_dataset
 from logs.dataset.manifest import MANIFEST_NAME
 from logs.errors import DatasetError
@@ -20,9 +20,12 @@ def load_labeled(paths: Sequence[Path], *, unblinded: bool = False) -> Dataset:
         unblinded: let verdicts given after a prediction had been seen replace blind ones.
 
     Raises:
-        DatasetError: a folder that is neither, or folders that do not fit together.
+        DatasetError: a folder that is neither, folders that do not fit together, or no trial that
+            counts in all of them.
     """
-    return merge([_load(path, unblinded) for path in paths])
+    dataset = merge([_load(path, unblinded) for path in paths])
+    refuse_empty(dataset)
+    return dataset
 
 
 def _load(path: Path, unblinded: bool) -> Dataset:

@@ -47,18 +47,25 @@ def _flat(matrix: FloatArray | None) -> list[float] | None:
 
 BASE_COLUMNS: tuple[Column, ...] = (
     Column("trial_id", "text", "unique id of the trial", lambda t: t.trial_id),
-    Column("session", "text", "session or source the trial is from", lambda t: t.session),
+    Column(
+        "session",
+        "text",
+        "folder name of the session, or source, the trial is from",
+        lambda t: t.session,
+    ),
     Column(
         "segment",
         "integer",
         "part of the session; grows with each accepted change of the station's set-up",
         lambda t: t.segment,
     ),
-    Column("number", "integer", "place in the planned order", lambda t: t.number),
+    Column("number", "integer", "place in the planned order, from 1", lambda t: t.number),
     Column("simulated", "truth", "true: no real robot moved", lambda t: t.simulated),
     Column("object", "text", "name of the object; its mesh is in meshes/", lambda t: t.object_name),
     Column("grasp_id", "text", "planned grasp; its repeats share it", lambda t: t.grasp_id),
-    Column("attempt", "integer", "index of the grasp among the object's", lambda t: t.attempt),
+    Column(
+        "attempt", "integer", "index of the grasp among the object's, from 0", lambda t: t.attempt
+    ),
     Column("repeat", "integer", "which repeat of the grasp, from 0", lambda t: t.repeat),
     Column("stable_pose", "integer", "index of the declared stable pose", lambda t: t.stable_pose),
     Column("success", "truth", "the label: stably lifted", lambda t: t.label.success),
@@ -206,7 +213,13 @@ BASE_COLUMNS: tuple[Column, ...] = (
         "ns",
         nullable=True,
     ),
-    Column("record", "text", "path of the MCAP record", lambda t: t.record, nullable=True),
+    Column(
+        "record",
+        "text",
+        "path of the MCAP record in the session's folder",
+        lambda t: t.record,
+        nullable=True,
+    ),
     Column("record_sha256", "text", "of the record", lambda t: t.record_sha256, nullable=True),
 )
 
@@ -227,7 +240,12 @@ def _score_columns(model: str) -> tuple[Column, Column, Column]:
 
     return (
         Column(
-            f"score_{model}", "number", f"score of {model}, 0 to 1", part("value"), nullable=True
+            f"score_{model}",
+            "number",
+            f"score of {model}, 0 to 1: of the planned grasp on the registered pose, as stored with "
+            "the trial; `reach evaluate` scores the planned pose anew",
+            part("value"),
+            nullable=True,
         ),
         Column(
             f"score_{model}_version", "text", f"version of {model}", part("version"), nullable=True

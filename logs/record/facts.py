@@ -9,7 +9,7 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
 
-from logs.errors import RecordReadError
+from logs.errors import RecordReadError, UnknownFormatError
 from logs.record.descriptions import GRIPPER_DESCRIPTION, read_gripper
 from logs.record.mesh_attachment import OBJECT_MESH, read_mesh
 from logs.record.outline import read_attachment, read_outline
@@ -47,22 +47,24 @@ class RecordFacts:
         return read_gripper(read_attachment(self.path, GRIPPER_DESCRIPTION))
 
 
-def read_facts(paths: Sequence[Path]) -> list[RecordFacts]:
-    """Facts of many records, in their order.
+def read_facts(paths: Sequence[Path]) -> list[RecordFacts | None]:
+    """Facts of many records, in their order; None for one that is missing or damaged.
 
     Raises:
-        RecordReadError: a record is missing or cannot be read.
+        UnknownFormatError: if a later release wrote one.
     """
     # Reading and hashing release the interpreter's lock: both cores work.
     with ThreadPoolExecutor(max_workers=os.cpu_count() or 1) as pool:
         return list(pool.map(_facts, paths))
 
 
-def _facts(path: Path) -> RecordFacts:
+def _facts(path: Path) -> RecordFacts | None:
     try:
         with path.open("rb") as stream:
             digest = hashlib.file_digest(stream, "sha256").hexdigest()
-    except OSError as error:
-        raise RecordReadError(f"cannot read a trial's record: {error}") from error
-    record = read_outline(path)
+        record = read_outline(path)
+    except UnknownFormatError:
+        raise
+    except (OSError, RecordReadError):
+        return None
     return RecordFacts(path, digest, record.descriptor, record.registration, record.execution)

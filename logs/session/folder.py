@@ -14,6 +14,7 @@ import uuid
 from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Literal
 
 from pydantic import BaseModel, ConfigDict, Field, JsonValue, ValidationError, model_validator
 
@@ -35,6 +36,7 @@ class SessionDescriptor(BaseModel):
     """The content of session.json: resolved, complete, and never written again.
 
     Args:
+        schema_version: of this file; a release refuses a session of another one.
         session_id: uuid of the session.
         created_ns: nanoseconds since the epoch.
         seed: every random number of the session derives from it.
@@ -49,7 +51,7 @@ class SessionDescriptor(BaseModel):
 
     model_config = ConfigDict(extra="forbid", frozen=True)
 
-    schema_version: int = 1
+    schema_version: Literal[1] = 1
     session_id: str = Field(default_factory=lambda: str(uuid.uuid4()))
     created_ns: int
     seed: int

@@ -18,7 +18,7 @@ def test_records_are_from_the_session_on_and_the_next_sitting_is_later(tmp_path:
     assert main(["collect", *WORDS.split(), "--out", str(out), "--no-report"]) == 0
     folder = SessionFolder.open(out)
     records = list(folder.trials.rglob("trial*.mcap"))
-    times = [one.execution.time_ns for one in read_facts(records) if one.execution is not None]
+    times = [one.execution.time_ns for one in read_facts(records) if one and one.execution]
     assert times
     assert all(time >= folder.descriptor.created_ns for time in times)
     assert last_recorded_ns(out) >= max(times)

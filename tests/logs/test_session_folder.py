@@ -146,6 +146,14 @@ def test_an_unreadable_descriptor_names_the_field(folder: SessionFolder) -> None
         SessionFolder.open(folder.path)
 
 
+def test_a_session_of_another_version_is_refused_and_not_guessed_at(folder: SessionFolder) -> None:
+    path = folder.path / SESSION_NAME
+    content = json.loads(path.read_text())
+    path.write_text(json.dumps({**content, "schema_version": 2}))
+    with pytest.raises(NotASessionError, match="schema_version: Input should be 1"):
+        SessionFolder.open(folder.path)
+
+
 def test_a_trials_takes_have_folders_of_their_own(folder: SessionFolder) -> None:
     assert folder.trial_folder("id-2").name == "0002_id-2"
     assert folder.trial_folder("id-2", take=2).name == "0002_id-2_take2"

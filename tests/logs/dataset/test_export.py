@@ -259,7 +259,7 @@ def test_refusals_leave_nothing_behind(make_dataset, tmp_path):
     empty = type(dataset)(
         **{f.name: getattr(dataset, f.name) for f in fields(dataset)} | {"trials": ()}
     )
-    with pytest.raises(DatasetError, match="no labeled trial"):
+    with pytest.raises(DatasetError, match="no trial that counts"):
         write_dataset(empty, tmp_path / "x")
     assert contents(tmp_path) == {"full/mine.txt": b"keep"}
     assert [p.name for p in tmp_path.iterdir()] == ["full"]

@@ -2,6 +2,7 @@
 
 import json
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -9,7 +10,7 @@ import pytest
 from logs.dataset.files import FORMATS, read_dataset, write_dataset
 from logs.dataset.from_session import session_dataset
 from logs.dataset.sources import load_labeled
-from logs.errors import DatasetError, NotASessionError, RecordReadError
+from logs.errors import DatasetError, NotASessionError, UnknownFormatError
 from logs.journal import events as ev
 from logs.record.facts import read_facts
 from logs.record.trial_record import read_record
@@ -76,9 +77,25 @@ def test_a_record_without_its_summary_is_read_whole(session):
     cut = read_facts([path])[0]
     assert cut.sha256 != whole.sha256
     np.testing.assert_array_equal(cut.execution.T_world_gripper, whole.execution.T_world_gripper)
-    path.unlink()
-    with pytest.raises(RecordReadError, match="cannot read a trial's record"):
-        session_dataset(session.path)
+
+
+@pytest.mark.parametrize("harm", [Path.unlink, lambda path: path.write_bytes(b"no record")])
+def test_one_lost_record_does_not_lock_the_others_away(session, tmp_path, harm):
+    whole = session_dataset(session.path)
+    harm(session.path / whole.trials[0].record)
+    rest = session_dataset(session.path)
+    assert [t.trial_id for t in rest.trials] == [t.trial_id for t in whole.trials[1:]]
+    lost = [row for row in rest.left_out if row.trial_id == whole.trials[0].trial_id]
+    assert [row.reason for row in lost] == ["labeled, but its record is missing or damaged"]
+    write_dataset(rest, tmp_path / "D", ["csv"])
+    assert lost[0].reason in (tmp_path / "D/README.md").read_text()
+
+
+def test_a_record_of_a_later_release_is_refused_and_not_left_out(tmp_path, sessions, monkeypatch):
+    monkeypatch.setattr("logs.record.encode.FORMAT_VERSION", 99)
+    later = sessions.build_session(tmp_path / "later", count=1)
+    with pytest.raises(UnknownFormatError, match="record format 99"):
+        session_dataset(later.path)
 
 
 def journal_after(session, *events):
@@ -182,9 +199,11 @@ def test_station_errors_add_to_the_registrations_own(session):
 
 def test_an_empty_session_is_refused_in_one_line(tmp_path, sessions):
     folder = sessions.make_session(tmp_path / "empty", 3)
-    dataset = load_labeled([folder.path])
-    with pytest.raises(DatasetError, match="no labeled trial: 3 planned ones"):
-        write_dataset(dataset, tmp_path / "out")
+    refusal = "no trial that counts; left out: 3 not executed"
+    with pytest.raises(DatasetError, match=refusal):
+        load_labeled([folder.path])
+    with pytest.raises(DatasetError, match=refusal):
+        write_dataset(session_dataset(folder.path), tmp_path / "out")
     (folder.path / "session.json").write_text("{}")
     with pytest.raises(NotASessionError):
         load_labeled([folder.path])
