@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from reach.symmetry import pose_distance
+from registration.doubt import CLEAR, ENOUGH, Doubt, RatedRival, moved
 from registration.job import Job
 from registration.refine import NEAR, fit_of
 from registration.search import Hypothesis
@@ -17,27 +17,9 @@ CLEARLY_WORSE = 0.15
 """A pose whose render cost is this far above the best one's needs no closer comparison."""
 REFUTED = 0.4
 """With this much evidence for another stable pose, the declared one is taken to be wrong."""
-ENOUGH = 4.0
-"""Log odds that rule a rival out. Along a direction that the fit leaves open, half a percent of a
-normal distribution lies further off on both sides."""
 MOST_RIVALS = 5
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class RatedRival:
-    """A physically different hypothesis.
-
-    Args:
-        hypothesis: the rival.
-        margin: evidence for the chosen hypothesis against it.
-        log_odds: natural logarithm of how much more likely the image makes the chosen one.
-        ruled_out: whether that is evidence enough.
-    """
-
-    hypothesis: Hypothesis
-    margin: float
-    log_odds: float
-    ruled_out: bool
+SECOND_THOUGHTS = 2
+"""So many times a close look may turn to a rival."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -83,7 +65,7 @@ def decide(job: Job, found: Sequence[Hypothesis], declared: int | None) -> Decis
             chosen = champion
         else:
             contradicts = True
-    rivals = _rivals(job, chosen, found)
+    chosen, rivals = _settled(job, chosen, found, declared=declared is not None)
     # All that are not ruled out are told; of the others, the strongest.
     count = max(MOST_RIVALS, sum(not rival.ruled_out for rival in rivals))
     return Decision(chosen, tuple(rivals[:count]), contradicts)
@@ -112,7 +94,28 @@ def _winner(job: Job, near: Sequence[Hypothesis]) -> Hypothesis:
     return best
 
 
-def _rivals(job: Job, chosen: Hypothesis, found: Sequence[Hypothesis]) -> list[RatedRival]:
+def _settled(
+    job: Job, chosen: Hypothesis, found: Sequence[Hypothesis], *, declared: bool
+) -> tuple[Hypothesis, list[RatedRival]]:
+    """The hypothesis to go on with and its rivals, looked at closely where doubt remains."""
+    rivals = _rivals(job, chosen, found)
+    if all(rival.clear or rival.hypothesis.search is not chosen.search for rival in rivals):
+        return chosen, rivals
+    look = job.close_look(chosen.search)
+    chosen = moved(chosen, look.aligned(chosen.T_camera_object))
+    for thought in range(SECOND_THOUGHTS + 1):
+        doubt = Doubt(job, look, chosen, declared=declared)
+        rivals = _rivals(job, chosen, found, doubt)
+        if doubt.better is None or thought == SECOND_THOUGHTS:
+            break
+        chosen = doubt.better
+    return chosen, rivals
+
+
+def _rivals(
+    job: Job, chosen: Hypothesis, found: Sequence[Hypothesis], doubt: Doubt | None = None
+) -> list[RatedRival]:
+    """Other poses than the chosen one, those that the image leaves open first."""
     near = [h for h in found if h.cost <= chosen.cost + CLEARLY_WORSE]
     here = [h for h in near if h.search is chosen.search and _differ(job, chosen, h)]
     rated = []
@@ -122,6 +125,9 @@ def _rivals(job: Job, chosen: Hypothesis, found: Sequence[Hypothesis]) -> list[R
             RatedRival(h, float(margin), float(odds), _rules_out(job, float(margin), float(odds)))
             for h, margin, odds in zip(here, evidence.margin, evidence.log_odds, strict=True)
         ]
+    if doubt is not None:
+        rated = doubt.settled(sorted(rated, key=lambda rival: rival.log_odds))
+    rated += _open_ends(job, chosen, doubt)
     # Another thing on the table that the part explains as well: which one is meant, no pixel
     # can tell.
     rated += [
@@ -131,11 +137,10 @@ def _rivals(job: Job, chosen: Hypothesis, found: Sequence[Hypothesis]) -> list[R
         and h.cost <= job.profile.max_cost
         and _differ(job, chosen, h)
     ]
-    rated += _open_ends(job, chosen)
     return sorted(rated, key=lambda rival: (rival.ruled_out, rival.margin))
 
 
-def _open_ends(job: Job, chosen: Hypothesis) -> list[RatedRival]:
+def _open_ends(job: Job, chosen: Hypothesis, doubt: Doubt | None) -> list[RatedRival]:
     """Where the part may be along directions that the fit leaves open, and the image too.
 
     The fit knows only where points lie; the image also shows what the camera would have seen.
@@ -154,13 +159,19 @@ def _open_ends(job: Job, chosen: Hypothesis) -> list[RatedRival]:
         if not poses:
             continue
         evidence = job.weigh(chosen, poses)
-        open_still = np.flatnonzero(evidence.log_odds < ENOUGH)
-        if len(open_still) == 0:
-            continue
-        last = int(open_still[-1])
-        cost = float(chosen.search.check(poses[last].T_camera_object[None]).cost[0])
-        margin, odds = float(evidence.margin[last]), float(evidence.log_odds[last])
-        ends.append(RatedRival(replace(poses[last], cost=cost), margin, odds, ruled_out=False))
+        quick = zip(poses, evidence.margin, evidence.log_odds, strict=True)
+        steps = [
+            RatedRival(pose, float(margin), float(odds), ruled_out=False)
+            for pose, margin, odds in quick
+            if odds < CLEAR
+        ]
+        if doubt is not None:
+            steps = [doubt.end(step) for step in steps]
+        last = next((step for step in reversed(steps) if not step.ruled_out), None)
+        if last is not None:
+            T = last.hypothesis.T_camera_object
+            cost = float(chosen.search.check(T[None]).cost[0])
+            ends.append(replace(last, hypothesis=replace(last.hypothesis, cost=cost)))
     return ends
 
 
@@ -170,10 +181,4 @@ def _rules_out(job: Job, margin: float, log_odds: float) -> bool:
 
 
 def _differ(job: Job, a: Hypothesis, b: Hypothesis) -> bool:
-    """Whether two poses are not the same up to the part's symmetry, as far as it matters."""
-    turn, shift = pose_distance(job.sym, a.T_camera_object, b.T_camera_object)
-    return (
-        turn > job.options.max_turn_error
-        or shift > job.options.max_shift_error
-        or job.model.surface_distance(a.T_camera_object, b.T_camera_object) > job.profile.distinct
-    )
+    return job.differ(a.T_camera_object, b.T_camera_object)

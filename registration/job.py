@@ -8,9 +8,11 @@ from contextlib import contextmanager
 
 import numpy as np
 
+from reach.arrays import FloatArray
 from reach.objects import GraspObject
 from reach.stable_poses import StablePose, stable_poses
-from reach.symmetry import symmetry
+from reach.symmetry import pose_distance, symmetry
+from registration.close_look import CloseLook
 from registration.evidence import Evidence, Weigher
 from registration.frame import DepthFrame
 from registration.mesh_model import mesh_model
@@ -111,11 +113,29 @@ class Job:
                 search.seen,
                 tolerance=search.fine_tolerance,
                 noise=search.depth_noise,
-                bias=float(np.hypot(self.profile.bias, FACE_ERROR)),
+                bias=self._bias,
             )
         return weigher.weigh(
             first.T_camera_object, np.stack([other.T_camera_object for other in others])
         )
+
+    def close_look(self, search: Search) -> CloseLook:
+        """The slow comparison of poses in a search's image."""
+        return CloseLook(search, self._bias)
+
+    def differ(self, a: FloatArray, b: FloatArray) -> bool:
+        """Whether two poses are not the same up to the part's symmetry, as far as it matters."""
+        turn, shift = pose_distance(self.sym, a, b)
+        return (
+            turn > self.options.max_turn_error
+            or shift > self.options.max_shift_error
+            or self.model.surface_distance(a, b) > self.profile.distinct
+        )
+
+    @property
+    def _bias(self) -> float:
+        """Standard deviation of the error that all depths share [m]."""
+        return float(np.hypot(self.profile.bias, FACE_ERROR))
 
     def _run(
         self,

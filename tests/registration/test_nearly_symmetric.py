@@ -9,9 +9,8 @@ from registration import register
 
 
 @pytest.mark.parametrize("mode", ["declared", "free"])
-@pytest.mark.parametrize("kind", ["near_sphere", "round_superellipsoid", "eccentric_disc"])
-def test_a_turn_that_noise_hides_is_never_accepted(scenes, is_right, kind, mode):
-    obj = holdout_part(kind, 1)
+def test_a_turn_that_noise_hides_is_never_accepted(scenes, mode):
+    obj = holdout_part("near_sphere", 1)
     rng = np.random.default_rng([1, 5])
     case = scenes.make_case(obj, rng, scenes.SceneSettings("stereo"), stable_pose=0)
     found = register(obj, case.frame, stable_pose=0, mode=mode)
@@ -23,6 +22,19 @@ def test_a_turn_that_noise_hides_is_never_accepted(scenes, is_right, kind, mode)
         if not rival.ruled_out
     ]
     assert turns and max(turns) > np.radians(5)
+
+
+@pytest.mark.parametrize("kind", ["round_superellipsoid", "eccentric_disc"])
+def test_a_turn_that_noise_nearly_hides_is_right_or_asked_about(scenes, is_right, kind):
+    obj = holdout_part(kind, 1)
+    accepted = 0
+    for seed in (5, 6, 7):
+        rng = np.random.default_rng([1, seed])
+        case = scenes.make_case(obj, rng, scenes.SceneSettings("stereo"), stable_pose=0)
+        found = register(obj, case.frame, stable_pose=0)
+        assert not found.accepted or is_right(case, found.T_camera_object)
+        accepted += found.accepted
+    assert accepted > 0
 
 
 @pytest.mark.parametrize("kind", ["near_sphere", "round_superellipsoid"])
