@@ -49,12 +49,20 @@ def evaluation_content(
 
 
 def model_names(models: str) -> list[str]:
-    """Names in a comma-separated list; `all` stands for every model."""
+    """Names in a comma-separated list; `all` stands for every model.
+
+    Raises:
+        InvalidInputError: no name is given.
+    """
+    from reach.errors import InvalidInputError
     from reach.models.names import MODEL_NAMES
 
     if models == "all":
         return list(MODEL_NAMES)
-    return list(dict.fromkeys(name.strip() for name in models.split(",") if name.strip()))
+    names = list(dict.fromkeys(name.strip() for name in models.split(",") if name.strip()))
+    if not names:
+        raise InvalidInputError(f"--models {models!r} names none; valid: {', '.join(MODEL_NAMES)}")
+    return names
 
 
 def chosen_pose_error(dataset: Dataset, given: str | None) -> tuple[PoseError, dict[str, Any]]:

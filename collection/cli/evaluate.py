@@ -73,9 +73,9 @@ def evaluate(
         raise InvalidInputError(f"--jobs is {jobs}, expected 1 or more, or -1 for all cores")
     printed = as_json is not None and str(as_json) == "-"
     check_files([None if printed else as_json, markdown, plots and plots / "reliability.svg"])
+    scorers = scorers_of(model_names(models))
     dataset = load_labeled(sources, unblinded=unblinded)
     error, basis = chosen_pose_error(dataset, pose_error)
-    scorers = scorers_of(model_names(models))
     cases = dataset.cases()
     with cluster(backend, scheduler), progress_bars() as progress:
         result = compare(

@@ -40,7 +40,9 @@ def export(
     from logs.dataset.sources import load_labeled
     from logs.numbers import counted
 
-    wanted = list(FORMATS) if formats == "all" else _split(formats)
+    wanted = _split(formats)
+    if "all" in wanted:
+        wanted = list(FORMATS)
     check_formats(wanted)
     check_new_folder(to)
     dataset = load_labeled(sources, unblinded=unblinded)

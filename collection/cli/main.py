@@ -115,6 +115,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return 0
     except OSError as error:
         return _complain(_of_the_system(error), 2)
+    except MemoryError as error:
+        return _complain(f"not enough memory: {error}", 2)
     except ImportError as error:
         if (library := _SYSTEM_LIBRARY.match(str(error))) is None:
             raise

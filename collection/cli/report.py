@@ -16,7 +16,7 @@ def report(
     out: Annotated[
         Path | None, typer.Option(help="The page; report.html in a single source if not given.")
     ] = None,
-    models: Annotated[str, typer.Option(help="Comma-separated model names.")] = ",".join(
+    models: Annotated[str, typer.Option(help="Comma-separated model names; or `all`.")] = ",".join(
         ANALYTIC_NAMES
     ),
     pose_error: Annotated[

@@ -32,7 +32,7 @@ def score(
         str | None,
         typer.Option(help="A mesh file or a built-in part's name; the grasps' own if left out."),
     ] = None,
-    models: Annotated[str, typer.Option(help="Names, separated by commas.")] = ",".join(
+    models: Annotated[str, typer.Option(help="Names, separated by commas; or `all`.")] = ",".join(
         ANALYTIC_NAMES
     ),
     mesh_unit: Annotated[
@@ -59,7 +59,9 @@ def score(
     - `reach score --grasps grasps.json --models reach-robust --pose-error 0.002,0.02`
     - `reach score sessions/monday --models settled,settled-robust`
     """
-    names = [name.strip() for name in models.split(",") if name.strip()]
+    from collection.analysis.evaluating import model_names
+
+    names = model_names(models)
     if sessions:
         _refuse_beside_sessions(
             grasps=grasps, mesh=mesh, mesh_unit=mesh_unit, mass=mass, force=force,

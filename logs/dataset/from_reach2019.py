@@ -60,6 +60,7 @@ PUBLISHED_RULE = (
     "Success: as the person at the robot judged after a lift of 100 mm; the exact rule is not "
     "published."
 )
+EXPORTED_RULE = "Success: as the session judged that was exported; this form carries no rule."
 
 
 @dataclass(frozen=True, slots=True)
@@ -124,10 +125,12 @@ def import_reach2019(
     _refuse_repeats(records)
     objects, sources = _load_objects(sorted({r.record.obj for r in records}), meshes, rule, unit)
     trials, split = _trials(records, objects)
+    kind = "Simulated" if any(trial.simulated for trial in trials) else "Physical"
+    exported = any("simulated" in (one.record.model_extra or {}) for one in records)
     return Dataset(
         name=grasps.stem,
         origin=(
-            "Physical trials in the form published in 2019 with the REACH model "
+            f"{kind} trials in the form published in 2019 with the REACH model "
             f"(imported from {grasps.name})."
         ),
         objects=objects,
@@ -135,8 +138,8 @@ def import_reach2019(
         gripper=ParallelJawGripper.yumi(),
         trials=trials,
         pose_error=STATED_POSE_ERROR,
-        notes=_notes(records, split),
-        success_rule=PUBLISHED_RULE,
+        notes=_notes(records, split, sorted(set(rule.grams) - set(objects))),
+        success_rule=EXPORTED_RULE if exported else PUBLISHED_RULE,
     )
 
 
@@ -234,7 +237,9 @@ def _trials(
     return tuple(trials), [f"{o}/{a:02d}" for (o, a), known in variants.items() if len(known) > 1]
 
 
-def _notes(records: Sequence[ReadRecord], split: Sequence[str]) -> tuple[str, ...]:
+def _notes(
+    records: Sequence[ReadRecord], split: Sequence[str], unused: Sequence[str]
+) -> tuple[str, ...]:
     notes = []
     projected = [one.deviation for one in records if one.deviation > PROJECTED_ABOVE]
     if projected:
@@ -251,4 +256,6 @@ def _notes(records: Sequence[ReadRecord], split: Sequence[str]) -> tuple[str, ..
     extra = sorted({key for one in records for key in (one.record.model_extra or {})})
     if extra:
         notes.append(f"Keys that the published form does not have are kept: {', '.join(extra)}.")
+    if unused:
+        notes.append(f"--masses also names objects that no trial has: {', '.join(unused)}.")
     return tuple(notes)

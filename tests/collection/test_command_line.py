@@ -55,6 +55,22 @@ def test_bad_input_is_refused_in_one_line(capsys, tmp_path, options, named):
     assert list(tmp_path.iterdir()) == []
 
 
+@pytest.mark.parametrize(
+    "command",
+    [["score", "--mesh", "cube_3cm", "--grasps", "none"], ["evaluate", "D"], ["report", "D"]],
+)
+def test_models_that_name_none_are_refused(capsys, command):
+    assert "--models ',' names none; valid: point" in refused(capsys, *command, "--models", ",")
+
+
+def test_what_no_memory_holds_is_refused_in_one_line(capsys, monkeypatch):
+    def too_many(*_: object, **__: object) -> None:
+        raise MemoryError("Unable to allocate 745. GiB")
+
+    monkeypatch.setattr("collection.sampling.over_poses.sample_over_poses", too_many)
+    assert "not enough memory" in refused(capsys, "sample", "--mesh", "cube_3cm")
+
+
 def test_a_dry_run_refuses_what_the_session_would_refuse(capsys, tmp_path):
     assert "yumi" in refused(capsys, *collect(tmp_path / "S", station="yumi"), "--dry-run")
     assert "exists" in refused(capsys, *collect(tmp_path), "--dry-run")

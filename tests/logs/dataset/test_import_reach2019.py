@@ -54,6 +54,13 @@ def read(files, records, grams=None):
     return import_reach2019(grasps, meshes, MassRule(grams or {}))
 
 
+def test_a_mass_that_fits_no_object_is_told(files):
+    """A misspelled name would else fall back to an assumed mass in silence."""
+    assert "no trial has: blokc." in read(files, [record()], {"blokc": 30.0}).notes[-1]
+    told = " ".join(read(files, [record()], {"block": 30.0}).notes)
+    assert "no trial has" not in told
+
+
 def test_poses_table_and_labels(files):
     dataset = read(files, [record(), record(trial=1, result=False)])
     first, second = dataset.trials
@@ -95,6 +102,8 @@ def test_a_recorded_session_survives_the_published_form(make_dataset, tmp_path):
         trimesh.Trimesh(part.vertices, part.faces).export(meshes / f"{part.name}.ply")
     back = import_reach2019(tmp_path / "a" / "reach2019", meshes, MassRule({}))
     assert back.simulated
+    assert back.origin.startswith("Simulated trials")  # nobody judged them at a robot
+    assert "person at the robot" not in back.success_rule
     assert len(back.trials) == len(dataset.trials)
     ours = {(t.object_name, t.attempt, t.repeat): t for t in dataset.trials}
     for trial in back.trials:
