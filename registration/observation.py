@@ -62,6 +62,7 @@ class Scan:
         table: fitted to it.
         labels: NO_RETURN, TABLE, FOREIGN, or a component's number from PART on, shape (H, W).
         components: points of each component, largest first, (N, 3) each, camera frame [m].
+        standing: of each component, whether it is clearly higher than noise raises bare table.
         diameter: of the part [m].
     """
 
@@ -69,6 +70,7 @@ class Scan:
     table: Table
     labels: NDArray[np.int16]
     components: tuple[FloatArray, ...]
+    standing: tuple[bool, ...]
     diameter: float
 
     def groups(self) -> tuple[tuple[int, ...], ...]:
@@ -84,7 +86,7 @@ class Scan:
                 if other != seed and self._fits([*members, other]):
                     members.append(other)
             group = tuple(sorted(members))
-            if not any(set(group) <= set(known) for known in groups):
+            if self._stand(group) and not any(set(group) <= set(known) for known in groups):
                 groups.append(group)
         return tuple(groups[:MAX_GROUPS])
 
@@ -92,7 +94,9 @@ class Scan:
         """Components one by one, those left out that are a group already."""
         known = self.groups()
         return tuple(
-            (i,) for i in range(min(MAX_GROUPS, len(self.components))) if (i,) not in known
+            (i,)
+            for i in range(min(MAX_GROUPS, len(self.components)))
+            if self.standing[i] and (i,) not in known
         )
 
     def subsets(self) -> tuple[tuple[int, ...], ...]:
@@ -104,7 +108,7 @@ class Scan:
             tuple(j for j in range(count) if j != i) for i in range(count)
         ]
         alone: list[tuple[int, ...]] = [(i,) for i in range(count)]
-        return tuple(dict.fromkeys(all_but + alone))
+        return tuple(filter(self._stand, dict.fromkeys(all_but + alone)))
 
     def observation(self, group: tuple[int, ...]) -> Observation:
         """The window around one group of components; all others are foreign to it."""
@@ -116,6 +120,9 @@ class Scan:
         depth = self.frame.depth[window].astype(float)
         corner = (window[1].start, window[0].start)
         return Observation(depth, labels, corner, points, self.frame, self.table)
+
+    def _stand(self, group: tuple[int, ...]) -> bool:
+        return any(self.standing[i] for i in group)
 
     def _fits(self, group: list[int]) -> bool:
         """Whether components lie within the part's diameter of each other, about."""
@@ -178,12 +185,13 @@ def scan(
     labels[np.isnan(heights)] = NO_RETURN
     components = tuple(_points(frame, labels == PART + i) for i in range(count))
     # Correlated noise raises patches of bare table a little above the cut.
-    if not any(_stands(table, points, cut + 1.5 * table.noise) for points in components):
+    standing = tuple(_stands(table, points, cut + 1.5 * table.noise) for points in components)
+    if not any(standing):
         raise TooFewPointsError(
             f"nothing stands on the table: no group of {options.min_points} depth points is "
             f"clearly higher than {cut * 1e3:.1f} mm"
         )
-    return Scan(frame, table, labels, components, model.obj.diameter)
+    return Scan(frame, table, labels, components, standing, model.obj.diameter)
 
 
 def _stands(table: Table, points: FloatArray, height: float) -> bool:

@@ -6,6 +6,8 @@ from reach.stable_poses import stable_poses
 from reach.transforms import make_transform, rotation_about
 from registration import RegistrationError, register
 from registration.errors import NoGoodPoseError, NoTableError, TiltedPoseError, TooFewPointsError
+from registration.job import Job
+from registration.options import PROFILES, RegistrationOptions
 
 SENSORS = ("structured-light", "stereo")
 
@@ -121,3 +123,22 @@ def test_a_table_that_is_not_level_does_not_matter(parts, scenes, is_right, sens
     assert found.accepted and is_right(case, found.T_camera_object)
     assert np.degrees(found.table.tilt) == pytest.approx(5, abs=0.2)
     assert found.tilt < np.radians(0.5)  # against the table, not the world
+
+
+def test_a_patch_of_raised_table_is_no_second_part(parts, scenes):
+    """A stereo camera's error lifts patches of bare table by a few millimeters."""
+    from dataclasses import replace
+
+    bracket = parts["bracket"]
+    case = scenes.make_case(bracket, np.random.default_rng(4), scenes.SceneSettings("stereo"))
+    table = Job(bracket, case.frame, RegistrationOptions(), seed=0).table
+    raised = max(PROFILES["stereo"].cut, 3 * table.noise) + 0.7 * table.noise
+    corner = np.s_[30:44, 40:54]
+    depth = np.array(case.frame.depth)
+    depth[corner] = (table.offset_camera + raised) / (
+        case.frame.intrinsics.rays()[corner] @ table.normal_camera
+    )
+    job = Job(bracket, replace(case.frame, depth=depth), RegistrationOptions(), seed=0)
+    assert len(job.scan.components) == 2
+    assert job.scan.groups() == ((0,),)
+    assert job.scan.singles() == ()
