@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Iterator
 
 import numpy as np
@@ -211,16 +210,6 @@ def test_the_same_seed_gives_the_same_trial() -> None:
         assert (a.time_ns, a.width, a.force) == (b.time_ns, b.width, b.force)
         np.testing.assert_array_equal(a.joints, b.joints)
     assert first.sensor_verdict.width_held != other.sensor_verdict.width_held
-
-
-def test_a_trial_costs_less_than_the_time_it_simulates(station: Station) -> None:
-    """The budget is 0.8 s; a loaded machine gets some more."""
-    run(station, place(station))
-    start = time.process_time()
-    execution = run(station, place(station, seed=1))
-    spent = time.process_time() - start
-    assert spent < 2.0
-    assert (execution.end_ns - execution.start_ns) * 1e-9 > 3 * spent
 
 
 def test_fingertips_that_meet_the_table_end_the_approach_there(station: Station) -> None:

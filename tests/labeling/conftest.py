@@ -159,7 +159,7 @@ def in_thread() -> Iterator[Callable[[Callable[[], Any]], Callable[[], Any]]]:
         threads.append(thread)
 
         def join() -> Any:
-            thread.join(10)
+            thread.join(60)
             assert not thread.is_alive(), "the call still waits"
             if isinstance(result[0], Exception):
                 raise result[0]

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import threading
-import time
 from collections import Counter
 from collections.abc import Iterator
 from typing import Any
@@ -288,10 +287,10 @@ def test_the_server_leaves_with_streams_open(bench: Any, serve: Any, client_of: 
     server = serve(bench)
     client = client_of(server)
     with client.stream("GET", "/api/stream") as stream:
-        next(messages(stream))
-        begun = time.monotonic()
+        received = messages(stream)
+        next(received)
         server.__exit__(None, None, None)
-        assert time.monotonic() - begun < 8  # it waits for no stream; how long: benchmarks
+        list(received)  # ended by the server in good order; one cut off raises
 
 
 def test_the_stream_ends_with_the_session(bench: Any, serve: Any, client_of: Any) -> None:

@@ -1,7 +1,6 @@
 """The recorder never makes the trial wait, never hides a loss, and leaves a proper file."""
 
 import threading
-import time
 from pathlib import Path
 
 import numpy as np
@@ -18,7 +17,7 @@ from logs.trial_folder import PART_NAME, RECORD_NAME
 
 @pytest.fixture
 def stalled(monkeypatch):
-    """A disk that does not answer until the returned event is set."""
+    """A disk that does not answer until the returned event is set; it fails whoever waits."""
     answer = threading.Event()
     real = mcap_file.DurableMcap.flush
 
@@ -54,17 +53,14 @@ def test_what_a_flush_confirmed_is_readable_at_once(made, tmp_path: Path) -> Non
 def test_a_stalled_disk_stops_no_motion(made, tmp_path: Path, stalled: threading.Event) -> None:
     recorder = TrialRecorder(tmp_path)
     depth = made.depth_of(made.camera(640, 480), made.cube())
-    began = time.perf_counter()
     recorder.start(made.descriptor(made.cube()))
     recorder.phase("execute")
     recorder.depth(DepthImage(1, depth))
     for i in range(200):
         recorder.jaw(i, 0.02)
     recorder.registration(made.registration())
-    waited = time.perf_counter() - began
-    stalled.set()
+    stalled.set()  # not before all calls returned: one that waited for the disk would never
     recorder.stop(ExitStatus.SUCCESS)
-    assert waited < 5  # not one of the calls waited for the 20 s disk
     assert len(read_record(tmp_path).jaw.widths) == 200
 
 
