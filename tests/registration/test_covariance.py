@@ -13,6 +13,9 @@ from registration.options import PROFILES
 from registration.polish import _systematic
 
 FULL = os.environ.get("REACH_SLOW") == "1"
+MOST_INSIDE = {"structured-light": 0.97, "stereo": 0.99}
+"""With stereo, height and two tilts are held by the table alone, and a simulated table is perfect:
+were the other three exactly as stated, 98.6 % would lie within (decision 0047)."""
 NAMES = ("bar_clamp", "bracket", "chiral_stair", "near_symmetric_box", "pipe_tee", "cube")
 
 
@@ -40,7 +43,7 @@ def test_ninety_percent_of_errors_lie_within_the_ninety_percent_ellipsoid(parts,
     inside = np.mean(np.array(distances) < stats.chi2.ppf(0.9, 6))
     # With a few trials the share scatters: three standard deviations of the binomial count.
     slack = 0.0 if FULL else 3 * np.sqrt(0.1 * 0.9 / len(distances))
-    assert 0.80 - slack <= inside <= 0.97 + slack
+    assert 0.80 - slack <= inside <= MOST_INSIDE[sensor] + slack
 
 
 def test_noisier_images_are_known_less_well(parts, scenes):
