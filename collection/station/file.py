@@ -6,6 +6,7 @@ import re
 import tomllib
 from collections.abc import Iterator
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 from pydantic import BaseModel, SecretStr, ValidationError
@@ -47,6 +48,18 @@ def read_sections(text: str, name: str) -> Sections:
     except tomllib.TOMLDecodeError as error:
         raise StationFileError(f"{name}: not a TOML file: {error}") from error
     return Sections(name, data, _line_numbers(text))
+
+
+def station_text(path: Path) -> str:
+    """Read a station file.
+
+    Raises:
+        StationFileError: it is not text.
+    """
+    try:
+        return path.read_text(encoding="utf-8")
+    except UnicodeDecodeError as error:
+        raise StationFileError(f"{path.name}: not a text file in UTF-8: {error}") from error
 
 
 def validated(

@@ -19,7 +19,13 @@ from collection.station.drivers import (
     BuildContext,
     find_driver,
 )
-from collection.station.file import Sections, read_sections, validated, without_secrets
+from collection.station.file import (
+    Sections,
+    read_sections,
+    station_text,
+    validated,
+    without_secrets,
+)
 from reach.errors import UnknownNameError
 
 if TYPE_CHECKING:
@@ -205,7 +211,7 @@ def read_station(name_or_path: str | Path) -> StationConfig:
         UnknownNameError: there is no such station.
     """
     path = find_station_file(name_or_path)
-    return parse_station(path.read_text(encoding="utf-8"), path.name)
+    return parse_station(station_text(path), path.name)
 
 
 def parse_station(text: str, name: str) -> StationConfig:
@@ -247,7 +253,7 @@ def load_station(name_or_path: str | Path, seed: int = 0) -> Station:
         UnknownNameError: there is no such station.
     """
     path = find_station_file(name_or_path)
-    text = path.read_text(encoding="utf-8")
+    text = station_text(path)
     return build_station(parse_station(text, path.name), text, path.parent, seed)
 
 

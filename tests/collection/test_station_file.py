@@ -86,6 +86,13 @@ def test_a_missing_driver_lists_the_valid_ones() -> None:
         parse_station(text, "lab.toml")
 
 
+def test_a_file_that_is_no_text_is_refused(tmp_path: Path) -> None:
+    path = tmp_path / "lab.toml"
+    path.write_bytes(b"\xff\xfe\x00")
+    with pytest.raises(StationFileError, match=r"lab.toml: not a text file in UTF-8"):
+        load_station(path)
+
+
 def test_broken_toml_is_told_with_its_line() -> None:
     with pytest.raises(StationFileError, match=r"lab.toml: not a TOML file: .*line 2"):
         parse_station('name = "x"\n[motion\n', "lab.toml")
