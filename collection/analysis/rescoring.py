@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 from collection.scoring.annotator import mirror_score, scored_event
 from collection.scoring.predictions import score_take
 from collection.session.setup import stated_pose_error
+from logs.errors import RecordError
 from logs.journal.state import SessionState
 from logs.session.folder import SessionFolder
 from logs.session.mirror import AnnotationMirror
@@ -17,9 +18,16 @@ if TYPE_CHECKING:
     from logs.journal.state import TakeState
 
 
+class Rescored(NamedTuple):
+    """How many takes were scored, and what was wrong with the records of the others."""
+
+    scored: int
+    unreadable: tuple[str, ...]
+
+
 def rescore(
     session: Path, models: Sequence[str], progress: Callable[[int, int], None] | None = None
-) -> int:
+) -> Rescored:
     """Score every executed take of a session with models, as new events.
 
     An earlier score stays in the journal; the newest of a model counts.
@@ -30,7 +38,7 @@ def rescore(
         progress: told how many takes are scored, and of how many.
 
     Returns:
-        How many takes were scored.
+        How many takes were scored, and why others were not: their records cannot be read.
 
     Raises:
         NotASessionError: no session there.
@@ -44,14 +52,20 @@ def rescore(
         state = SessionState.fold(folder.descriptor.trials, journal.entries)
         mirror = AnnotationMirror(folder, journal.entries)
         takes = _executed_takes(state)
+        unreadable: list[str] = []
         for number, (trial_id, take) in enumerate(takes):
             if progress is not None:
                 progress(number, len(takes))
             assert take.record is not None
-            for prediction in score_take((session / take.record).parent, models, pose_error):
+            try:
+                predictions = score_take((session / take.record).parent, models, pose_error)
+            except RecordError as error:
+                unreadable.append(str(error))
+                continue
+            for prediction in predictions:
                 entry = journal.append(scored_event(trial_id, take.take, prediction))
                 mirror_score(mirror, entry, prediction)
-        return len(takes)
+        return Rescored(len(takes) - len(unreadable), tuple(unreadable))
     finally:
         journal.close()
 

@@ -123,15 +123,20 @@ def _score_sessions(sessions: Sequence[Path], names: Sequence[str], *, as_json: 
         make_scorer(name)
     for session in sessions:
         SessionFolder.open(session)
-    counts = {}
     with progress_bars() as progress:
-        for session in sessions:
-            counts[str(session)] = rescore(session, names, partial(progress, session.name))
+        results = {
+            str(session): rescore(session, names, partial(progress, session.name))
+            for session in sessions
+        }
+    for result in results.values():
+        for problem in result.unreadable:
+            typer.echo(f"not scored: {problem}", err=True)
     if as_json:
+        counts = {name: result.scored for name, result in results.items()}
         typer.echo(json.dumps({"scored_takes": counts, "models": list(names)}))
         return
-    for name, count in counts.items():
-        typer.echo(f"{name}: {count} takes scored with {', '.join(names)}")
+    for name, result in results.items():
+        typer.echo(f"{name}: {result.scored} takes scored with {', '.join(names)}")
 
 
 def parse_pose_error(text: str | None) -> PoseError | None:

@@ -7,7 +7,7 @@ from functools import cached_property
 from typing import Annotated, Any
 
 import numpy as np
-from pydantic import BaseModel, BeforeValidator, ConfigDict, PlainSerializer
+from pydantic import BaseModel, BeforeValidator, ConfigDict, PlainSerializer, ValidationError
 
 from collection.errors import PlanError
 from collection.sampling.options import SamplingOptions
@@ -132,5 +132,7 @@ class Plan(_Record):
         """
         try:
             return cls.model_validate_json(text)
-        except ValueError as error:
-            raise PlanError(f"not a plan: {error}") from error
+        except ValidationError as error:
+            first = error.errors()[0]
+            where = ".".join(map(str, first["loc"])) or "content"
+            raise PlanError(f"not a plan: {where}: {first['msg']}") from error

@@ -1,6 +1,7 @@
 """One real simulated session, run as a user runs it, and everything that must be true of it."""
 
 import json
+import shutil
 import subprocess
 import sys
 import time
@@ -122,6 +123,24 @@ def test_scoring_again_adds_events_and_changes_no_label(session, capsys):
     assert main(["score", str(out), "--models", "pointy"]) == 2
     assert "pointy" in capsys.readouterr().err
     assert SessionFolder.open(out).read_state().seq == after.seq
+
+
+def test_a_torn_record_keeps_no_other_from_being_scored_and_recovery_tells_it(
+    session, tmp_path, capsys
+):
+    out = tmp_path / "S"
+    shutil.copytree(session[0], out)
+    assert main(["recover", str(out)]) == 0
+    trials = SessionFolder.open(out).read_state().order
+    record = out / trials[1].valid_take.record
+    record.write_bytes(record.read_bytes()[:500])
+    capsys.readouterr()
+    assert main(["score", str(out), "--models", "point", "--json"]) == 0
+    told = capsys.readouterr()
+    assert json.loads(told.out)["scored_takes"] == {str(out): len(trials) - 1}
+    assert f"not scored: {record.parent.parent}" in told.err and record.parent.name in told.err
+    assert main(["recover", str(out)]) == 1
+    assert "ERROR" in capsys.readouterr().out
 
 
 def test_the_report_shows_what_the_plan_covers(session, tmp_path, capsys):

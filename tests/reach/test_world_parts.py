@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import time
 from pathlib import Path
 
 import numpy as np
@@ -61,9 +60,7 @@ def test_a_second_load_comes_from_the_cache(
         raise AssertionError("decomposed twice")
 
     monkeypatch.setattr("reach.world.decomposition._decompose", refuse)
-    start = time.process_time()
     second = convex_parts(tee())
-    assert time.process_time() - start < 0.05
     for (v1, f1), (v2, f2) in zip(first, second, strict=True):
         np.testing.assert_array_equal(v1, v2)
         np.testing.assert_array_equal(f1, f2)
