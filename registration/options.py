@@ -22,8 +22,8 @@ class SensorProfile:
         max_cost: a pose with a larger render cost does not explain the image.
         min_margin: less evidence than this against some rival makes a pose ambiguous; see
             `registration.evidence.Evidence`.
-        bias: standard deviation of the error that the part's depths share and the table's do not
-            [m]; what both share is the calibration's.
+        bias: standard deviation of the error that a whole patch of depths shares, as far as the
+            comparison of poses allows for it [m].
     """
 
     noise_bounds: tuple[float, float]
@@ -36,7 +36,7 @@ class SensorProfile:
 
 PROFILES = {
     "structured-light": SensorProfile((1e-4, 6e-4), 0.8e-3, 3e-3, 0.25, 0.05, 1e-5),
-    "stereo": SensorProfile((4e-4, 3e-3), 3e-3, 5e-3, 0.35, 0.05, 1e-5),
+    "stereo": SensorProfile((4e-4, 3e-3), 3e-3, 5e-3, 0.35, 0.05, 1e-4),
 }
 """By `DepthFrame.sensor`."""
 

@@ -17,7 +17,6 @@ from reach.transforms import exp, inverse, skew
 from registration.free_turns import told_directions
 from registration.mesh_model import MeshModel
 from registration.observation import Observation
-from registration.options import SensorProfile
 from registration.support import Support
 
 POINTS = 1500
@@ -27,6 +26,9 @@ SHALLOW = 0.3
 PRINT_ERROR = 1e-5
 """Standard deviation of the part's shape against its mesh, averaged over the part: an offset of
 the whole pose [m]."""
+SHARED_ERROR = 1e-5
+"""Standard deviation of the error that the part's depths share and the table's do not [m]; what both
+share is the calibration's."""
 UNKNOWN_TURN, UNKNOWN_PLACE = np.pi / np.sqrt(3.0), 0.1
 """Standard deviations of a direction that nothing tells about [rad, m]: a turn that may be any."""
 RIM, RIM_ERROR = 0.25, 0.15
@@ -61,7 +63,6 @@ def polish(
     model: MeshModel,
     seen: Observation,
     T_camera_object: FloatArray,
-    profile: SensorProfile,
     support: Support | None,
     sym: Symmetry,
 ) -> Polished:
@@ -73,7 +74,6 @@ def polish(
         model: of the part.
         seen: the image's window.
         T_camera_object: start, shape (4, 4).
-        profile: of the sensor.
         support: what the table says of height and tilt; None if the part may lie in any way.
         sym: of the part.
     """
@@ -104,7 +104,7 @@ def polish(
     T[:3, :3] = _orthonormal(T[:3, :3])
     residual, _ = _residuals(model, points, T)
     near = np.abs(residual) < max(3 * seen.table.noise, 0.5e-3)
-    covariance = np.linalg.inv(total) + _systematic(T, points, profile)
+    covariance = np.linalg.inv(total) + _systematic(T, points)
     return Polished(
         T,
         0.5 * (covariance + covariance.T),
@@ -223,14 +223,12 @@ def _vague(com: FloatArray) -> FloatArray:
     return result
 
 
-def _systematic(
-    T_camera_object: FloatArray, points_camera: FloatArray, profile: SensorProfile
-) -> FloatArray:
-    """Covariance (6, 6) of what averaging does not reduce: the sensor's bias, the print's error."""
+def _systematic(T_camera_object: FloatArray, points_camera: FloatArray) -> FloatArray:
+    """Covariance (6, 6) of what averaging does not reduce: along the view, and the print's."""
     ray = points_camera.mean(axis=0)
     ray = T_camera_object[:3, :3].T @ (ray / np.linalg.norm(ray))
     result = np.zeros((6, 6))
-    result[3:, 3:] = profile.bias**2 * np.outer(ray, ray) + PRINT_ERROR**2 * np.eye(3)
+    result[3:, 3:] = SHARED_ERROR**2 * np.outer(ray, ray) + PRINT_ERROR**2 * np.eye(3)
     return result
 
 

@@ -98,9 +98,7 @@ def fit_of(job: Job, hypothesis: Hypothesis) -> Polished:
     if hypothesis.polished is not None:
         return hypothesis.polished
     T = hypothesis.T_camera_object
-    return polish(
-        job.model, hypothesis.search.seen, T, job.profile, _support(job, hypothesis), job.sym
-    )
+    return polish(job.model, hypothesis.search.seen, T, _support(job, hypothesis), job.sym)
 
 
 def _support(job: Job, hypothesis: Hypothesis) -> Support | None:
