@@ -8,7 +8,7 @@ import numpy as np
 
 from logs.record.descriptions import GRIPPER_FRAME
 from logs.record.mesh_attachment import OBJECT_MESH, read_mesh
-from logs.record.streams import FrameTrack
+from logs.record.streams import FrameTrack, JawTrack
 from logs.record.trial_record import TrialRecord
 from logs.view import colors
 from logs.view.stage import Stage, flat_mesh, placed
@@ -20,7 +20,7 @@ OBJECT = f"{WORLD}/object"
 TRUTH_FRAME = "object_truth"
 """Frame of a simulated object's true pose; never part of a blind view."""
 OPENED_AGAIN = 2e-3
-"""A held object is let go when the jaws open by this much [m]."""
+"""A held object is let go when the jaws are wider than at their tightest by this much [m]."""
 
 
 def show_object(stage: Stage, record: TrialRecord, *, blind: bool) -> None:
@@ -77,9 +77,17 @@ def _carried(record: TrialRecord) -> tuple[FrameTrack, Any] | None:
     execution, track = record.execution, record.frames.get(GRIPPER_FRAME)
     if execution is None or track is None or execution.sensor_verdict != "held":
         return None
-    jaw = record.jaw
-    after = jaw.time_ns >= execution.time_ns
-    closed = jaw.widths[after][:1]
-    opened = after & (jaw.widths > (closed[0] if len(closed) else np.inf) + OPENED_AGAIN)
-    until = jaw.time_ns[opened][0] if opened.any() else track.time_ns[-1]
-    return track, (track.time_ns >= execution.time_ns) & (track.time_ns <= until)
+    until = _let_go(record.jaw, execution.time_ns)
+    carries = track.time_ns >= execution.time_ns
+    return track, carries if until is None else carries & (track.time_ns <= until)
+
+
+def _let_go(jaw: JawTrack, closing_ns: int) -> int | None:
+    """When jaws that began to close then have opened again [ns]; None if they have not."""
+    after = jaw.time_ns >= closing_ns
+    times, widths = jaw.time_ns[after], jaw.widths[after]
+    if not len(widths):
+        return None
+    tightest = int(np.argmin(widths))
+    opened = times[tightest:][widths[tightest:] > widths[tightest] + OPENED_AGAIN]
+    return int(opened[0]) if len(opened) else None

@@ -4,6 +4,7 @@ import json
 import os
 import shutil
 import subprocess
+from dataclasses import replace
 from pathlib import Path
 from types import ModuleType
 
@@ -16,6 +17,7 @@ from logs.record.annotations import LabelRecord, ScoreRecord
 from logs.record.descriptions import robot_attachment
 from logs.record.recorder import TrialRecorder
 from logs.record.records import ExitStatus
+from logs.record.streams import JawTrack
 from logs.record.trial_record import read_record
 from logs.view.colors import pressure_colors
 from logs.view.eyes import turned_to_hand
@@ -232,6 +234,21 @@ def test_the_object_stands_where_it_was_found_and_is_then_carried(made, take: Pa
     gripper = record.frames["gripper"].transforms()[-1]
     held = gripper @ np.linalg.inv(record.execution.executed.T_object_gripper)
     assert np.allclose(poses[-1], held)
+
+
+def test_an_object_that_was_put_down_stays_there(made, take: Path) -> None:
+    """The jaws close only after the grasp's time, hold, and open before the hand leaves."""
+    record = read_record(take)
+    begun, track = record.execution.time_ns, record.frames["gripper"]
+    steps = track.time_ns[track.time_ns >= begun]
+    widths = np.full(len(steps), 0.05)
+    widths[1:-2] = 0.03
+    record = replace(record, jaw=JawTrack(steps, widths, np.zeros(len(steps))))
+    times, poses = object_track(record)
+    assert times[-1] == steps[-2] < track.time_ns[-1]
+    left = track.transforms()[track.time_ns == steps[-2]][0]
+    T_gripper_object = np.linalg.inv(record.execution.executed.T_object_gripper)
+    assert np.allclose(poses[-1], left @ T_gripper_object)
 
 
 def test_frames_are_drawn_where_the_record_says(made, tmp_path: Path) -> None:
