@@ -9,7 +9,6 @@ from __future__ import annotations
 import os
 import socket
 import subprocess
-import sys
 import tempfile
 import time
 from importlib.metadata import version
@@ -19,6 +18,8 @@ from typing import Final
 import httpx
 
 from labeling.errors import LabelingError
+from logs.errors import ViewError
+from logs.view.viewer import viewer_program
 from reach.cache import cache_folder
 
 ASSETS: Final = {
@@ -47,7 +48,10 @@ def viewer_asset(name: str) -> Path:
 def _fetch_into(folder: Path) -> None:
     folder.mkdir(parents=True, exist_ok=True)
     web_port, grpc_port = _free_ports(2)
-    command = [sys.executable, "-m", "rerun", "--serve-web", "--bind", "127.0.0.1"]
+    try:
+        command = [viewer_program(), "--serve-web", "--bind", "127.0.0.1"]
+    except ViewError as error:
+        raise ViewerAssetsError(f"the rerun viewer cannot be embedded: {error}") from error
     command += ["--web-viewer-port", str(web_port), "--port", str(grpc_port)]
     quiet = subprocess.DEVNULL
     with subprocess.Popen(command, stdin=quiet, stdout=quiet, stderr=quiet) as program:
