@@ -8,14 +8,15 @@ rigid one moves it freely, held by a prior.
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from reach.arrays import FloatArray
+from reach.kernels.cholesky import solve_definite
+from reach.kernels.compiling import compiled
 from registration.sdf import distance_and_gradient
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def align_planar(
     values: NDArray[np.float32],
     origin: FloatArray,
@@ -98,7 +99,7 @@ def align_planar(
     return result, loss
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def align_rigid(
     values: NDArray[np.float32],
     origin: FloatArray,
@@ -161,7 +162,7 @@ def align_rigid(
                 hessian[i, i] += m * prior[i]
                 for j in range(i):
                     hessian[j, i] = hessian[i, j]
-            xi = -_solve6(hessian, gradient)
+            xi = -solve_definite(hessian, gradient)
             turn = (xi[0] ** 2 + xi[1] ** 2 + xi[2] ** 2) ** 0.5
             way = (xi[3] ** 2 + xi[4] ** 2 + xi[5] ** 2) ** 0.5
             xi *= min(1.0, 0.3 / max(turn, 1e-12), 0.02 / max(way, 1e-12))
@@ -169,33 +170,7 @@ def align_rigid(
     return result, loss
 
 
-@njit(cache=True)
-def _solve6(matrix: FloatArray, right: FloatArray) -> FloatArray:
-    """Solve a symmetric positive definite system by Cholesky: small, and the same on any machine."""
-    n = len(right)
-    lower = np.zeros((n, n))
-    for i in range(n):
-        for j in range(i + 1):
-            s = matrix[i, j]
-            for k in range(j):
-                s -= lower[i, k] * lower[j, k]
-            if i == j:
-                lower[i, i] = max(s, 1e-18) ** 0.5
-            else:
-                lower[i, j] = s / lower[j, j]
-    x = right.copy()
-    for i in range(n):
-        for k in range(i):
-            x[i] -= lower[i, k] * x[k]
-        x[i] /= lower[i, i]
-    for i in range(n - 1, -1, -1):
-        for k in range(i + 1, n):
-            x[i] -= lower[k, i] * x[k]
-        x[i] /= lower[i, i]
-    return x
-
-
-@njit(cache=True)
+@compiled
 def _move(T: FloatArray, xi: FloatArray) -> None:
     """Apply T exp(xi) in place: Rodrigues' formula, translation to first order in the turn."""
     angle = (xi[0] ** 2 + xi[1] ** 2 + xi[2] ** 2) ** 0.5

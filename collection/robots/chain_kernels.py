@@ -1,7 +1,8 @@
 """Compiled kinematics of a serial arm and its numerical inverse; see `kinematics`, `reach_search`.
 
 Arrays are named as in `collection.robots.kinematics.SerialChain`. All functions stand in this one
-file on purpose: numba's cache notices changes of the file of a function, not of its callees.
+file or in `reach.kernels` on purpose: numba's cache notices changes of a function's own file, and
+the folder of `compiled` those of the kernels, but no other callee's.
 """
 
 from __future__ import annotations
@@ -11,6 +12,7 @@ import math
 import numpy as np
 
 from reach.arrays import BoolArray, FloatArray
+from reach.kernels.cholesky import solve_definite
 from reach.kernels.compiling import compiled
 
 ITERATIONS = 60
@@ -201,32 +203,9 @@ def _damped_step(
             residual[row] -= J[row, k] * step[k]
             for column in range(row + 1):
                 gram[row, column] += free[k] * J[row, k] * J[column, k]
-    _solve_in_place(gram, residual)
+    weights = solve_definite(gram, residual)
     for k in range(len(q)):
         along = 0.0
         for row in range(6):
-            along += J[row, k] * residual[row]
+            along += J[row, k] * weights[row]
         step[k] += free[k] * along
-
-
-@compiled
-def _solve_in_place(gram: FloatArray, right: FloatArray) -> None:
-    """Solve a positive definite system by Cholesky's factors; reads the lower triangle."""
-    size = len(right)
-    for column in range(size):
-        for row in range(column, size):
-            value = gram[row, column]
-            for k in range(column):
-                value -= gram[row, k] * gram[column, k]
-            if row == column:
-                gram[row, row] = math.sqrt(value)
-            else:
-                gram[row, column] = value / gram[column, column]
-    for row in range(size):
-        for k in range(row):
-            right[row] -= gram[row, k] * right[k]
-        right[row] /= gram[row, row]
-    for row in range(size - 1, -1, -1):
-        for k in range(row + 1, size):
-            right[row] -= gram[k, row] * right[k]
-        right[row] /= gram[row, row]

@@ -101,6 +101,13 @@ def _executed_take(trial: TrialState) -> TakeState:
     return take
 
 
+def _take_at_rest(trial: TrialState) -> TakeState:
+    """The take under way, unless the robot moves in it; else the one that was executed."""
+    _not_moving(trial)
+    take = trial.active_take
+    return take if take is not None and take.status == "running" else _executed_take(trial)
+
+
 def _not_moving(trial: TrialState) -> None:
     take = trial.takes[-1] if trial.takes else None
     if take is not None and take.status == "running" and take.phase is Phase.EXECUTE:
@@ -192,18 +199,12 @@ def _undo_second(
 
 
 def _redo(state: SessionState, trial: TrialState, value: Value, who: Fields, _: bool) -> AnyEvent:
-    _not_moving(trial)
-    take = trial.active_take
-    if take is None or take.status != "running":
-        take = _executed_take(trial)
+    take = _take_at_rest(trial)
     return _make(ev.Redone, who, take=take.take, **value.model_dump())
 
 
 def _void(state: SessionState, trial: TrialState, value: Value, who: Fields, _: bool) -> AnyEvent:
-    _not_moving(trial)
-    take = trial.active_take
-    if take is None or take.status != "running":
-        take = _executed_take(trial)
+    take = _take_at_rest(trial)
     return _make(ev.Voided, who, take=take.take, **value.model_dump())
 
 

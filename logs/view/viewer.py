@@ -101,13 +101,15 @@ class WebViewer:
 
     Args:
         paths: .rrd files; the first is shown.
+        usual_ports: take Rerun's own ports if they are free; otherwise any.
 
     Raises:
         ViewError: if the server does not start.
     """
 
-    def __init__(self, paths: Sequence[Path]) -> None:
-        self.address = WebAddress(_free_port(WEB_PORT), _free_port(DATA_PORT))
+    def __init__(self, paths: Sequence[Path], *, usual_ports: bool = True) -> None:
+        wanted = (WEB_PORT, DATA_PORT) if usual_ports else (0, 0)
+        self.address = WebAddress(*map(_free_port, wanted))
         where = ["--serve-web", "--bind", LOOPBACK]
         where += ["--web-viewer-port", str(self.address.page), "--port", str(self.address.data)]
         self._process = _start(where, paths, dict(os.environ), quiet=True)

@@ -5,21 +5,21 @@ from pathlib import Path
 
 import pytest
 
-from labeling.server import viewer_assets
 from labeling.server.viewer_assets import ASSETS, ViewerAssetsError, viewer_asset
+from logs.view import viewer
 
 
 @pytest.fixture
 def ports(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> list[int]:
     """The ports of every server that is started, with an empty cache."""
     used: list[int] = []
-    free = viewer_assets._free_ports
+    free = viewer._free_port
 
-    def noted(count: int) -> list[int]:
-        used.extend(free(count))
-        return used[-count:]
+    def noted(wanted: int) -> int:
+        used.append(free(wanted))
+        return used[-1]
 
-    monkeypatch.setattr(viewer_assets, "_free_ports", noted)
+    monkeypatch.setattr(viewer, "_free_port", noted)
     monkeypatch.setenv("REACH_CACHE", str(tmp_path))
     return used
 
